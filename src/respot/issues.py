@@ -1,0 +1,143 @@
+"""Issue records and the one table of their codes.
+
+Every doubt that respot has about a file, a target or a fit becomes an `Issue` with a code from `CODES`; nothing below the
+command line prints or exits. Input that makes an answer impossible raises `BadInputError`, which carries its issue.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Level(StrEnum):
+    """How serious an issue is: an error means that an answer or a program is missing."""
+
+    INFO = "info"
+    WARNING = "warning"
+    ERROR = "error"
+
+
+_I, _W, _E = Level.INFO, Level.WARNING, Level.ERROR
+
+#: code -> (level, what it means). The message of an issue says what happened; this says what the code is for.
+CODES: dict[str, tuple[Level, str]] = {
+    # input from strangers
+    "CANNOT_READ": (_E, "a file is missing or cannot be read"),
+    "NO_ROBOT": (_E, "the source holds no robot program that respot knows"),
+    "SEVERAL_ROBOTS": (_E, "the source holds more than one robot; one must be named"),
+    "UNSAFE_ARCHIVE": (_E, "an archive entry would be written outside its folder"),
+    "BAD_TABLE": (_E, "a table cannot be read"),
+    "MISSING_COLUMN": (_E, "a table lacks a column that is needed"),
+    "NOT_A_NUMBER": (_E, "a cell that must hold a finite number does not"),
+    "DUPLICATE_ID": (_E, "the same spot ID stands twice in a table"),
+    "BAD_CALIBRATION": (_E, "a calibration file cannot be used"),
+    "BAD_OPTION": (_E, "an option or a combination of options makes no sense"),
+    "OUTPUT_EXISTS": (_E, "the output folder exists and is not empty"),
+    # matching and fitting
+    "NO_COMMON_IDS": (_E, "source and reference share no spot ID"),
+    "TOO_FEW_PAIRS": (_E, "fewer than four spots are matched"),
+    "COLLINEAR_SPOTS": (_E, "the matched spots lie on a line: the rotation about it is not determined"),
+    "UNMATCHED_SOURCE": (_W, "a spot of the source has no partner in the reference"),
+    "UNMATCHED_REFERENCE": (_W, "a spot of the reference has no partner in the source"),
+    "EXCHANGED_NAMES": (_W, "spots carry each other's names"),
+    "ROTATION_NOT_SUPPORTED": (_I, "the data do not support a rotation: a translation alone predicts no worse"),
+    "OUTLIER": (_W, "a spot does not follow the model"),
+    # reading programs
+    "OPAQUE_STATEMENT": (_W, "a statement that no rule knows; it is kept as it is"),
+    "UNBALANCED_BLOCK": (_W, "a block or fold is opened and not closed, or closed and not opened"),
+    "UNKNOWN_ENCODING": (_W, "the bytes of a file fit no code page of its language"),
+    "BINARY_MODULE": (_I, "an encoded module; it is copied as it is"),
+    "NOT_A_PROGRAM": (_I, "a file with a program's name that is something else; it is copied as it is"),
+    "UNKNOWN_FRAME": (_E, "the base or work object of a target is not known"),
+    "UNKNOWN_TOOL": (_W, "the tool of a target is not known"),
+    "UNKNOWN_TARGET": (_E, "a motion goes to a target that is not declared"),
+    "RUN_TIME_POSE": (_E, "the position of a motion is computed while the robot runs"),
+    "EXTERNAL_TCP": (_E, "the robot holds the part: the target is the gun's TCP seen from the part"),
+    "AMBIGUOUS_SPOT": (_E, "a spot ID stands for several different weld targets"),
+    # correcting
+    "OUT_OF_SCOPE": (_I, "the target's base holds no matched spot; it stays"),
+    "NOT_REACHED": (_I, "no routine with a matched spot moves to the target; it stays"),
+    "JOINT_TARGET": (_I, "a joint position; it stays"),
+    "WORLD_BASE": (
+        _E,
+        "a target in the world frame of a routine that welds: the program cannot tell if it belongs to the part",
+    ),
+    "CONFIG_NOT_CHECKED": (_E, "status/turn or confdata of a moved target cannot be computed: no kinematic model"),
+    "SHIFT_TOO_LARGE": (_E, "a target would move further than --max-shift"),
+    "RESIDUAL_TOO_LARGE": (_E, "a moved target departs from the path's rigid motion by more than --max-residual"),
+    "EXTRAPOLATED": (_W, "a moved target lies outside the hull of the fitted spots"),
+    "SHARED_TARGET": (_E, "a target is used under several bases or by a refused program"),
+    "ALREADY_APPLIED": (_E, "this calibration was applied to this source before"),
+    "NOT_CHECKED": (_I, "what respot does not check"),
+    "VERIFY_FAILED": (_E, "what was written is not what was intended"),
+}
+
+
+@dataclass(frozen=True)
+class Issue:
+    """One finding, with the place it is about.
+
+    Parameters
+    ----------
+    code : str
+        A key of `CODES`.
+    message : str
+        What happened and what to do about it, in one or two sentences.
+    path : str, optional
+        File the issue is about, as the user knows it.
+    line, column : int, optional
+        Place in the file, counted from 1.
+    excerpt : str, optional
+        The line itself.
+    """
+
+    code: str
+    message: str
+    path: str | None = None
+    line: int | None = None
+    column: int | None = None
+    excerpt: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.code not in CODES:
+            raise KeyError(self.code)
+
+    @property
+    def level(self) -> Level:
+        """Level of the issue's code."""
+        return CODES[self.code][0]
+
+    def __str__(self) -> str:
+        place = ":".join(str(part) for part in (self.path, self.line, self.column) if part is not None)
+        text = f"{place}: {self.code} {self.message}" if place else f"{self.code} {self.message}"
+        if self.excerpt:
+            text += f"\n    {self.excerpt}"
+            if self.column is not None:
+                text += f"\n    {' ' * (self.column - 1)}^"
+        return text
+
+    def as_json(self) -> dict[str, object]:
+        """Record of INTERFACES.md, JSON."""
+        return {
+            "level": self.level.value,
+            "code": self.code,
+            "message": self.message,
+            "path": self.path,
+            "line": self.line,
+            "column": self.column,
+        }
+
+
+class BadInputError(Exception):
+    """Input or options that make an answer impossible: exit code 2, nothing written."""
+
+    def __init__(self, code: str, message: str, path: str | None = None, line: int | None = None) -> None:
+        self.issue = Issue(code, message, path, line)
+        super().__init__(str(self.issue))
+
+
+def has_errors(issues: Iterable[Issue]) -> bool:
+    """Whether any issue is an error."""
+    return any(issue.level is Level.ERROR for issue in issues)

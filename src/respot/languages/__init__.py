@@ -1,0 +1,1 @@
+"""The robot languages: one folder each, with the same file names in each."""

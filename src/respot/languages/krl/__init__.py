@@ -1,0 +1,1 @@
+"""KUKA Robot Language."""

@@ -1,0 +1,1 @@
+"""The neutral model of robot programs that both languages are read into."""

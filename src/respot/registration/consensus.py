@@ -1,0 +1,70 @@
+"""A start for the robust fit that survives half of the pairs being wrong.
+
+Least quantile of squares over three-point fits (P. J. Rousseeuw, JASA 79 (1984)), sharpened by concentration
+steps (Rousseeuw and Van Driessen, Technometrics 41 (1999)).
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+from math import ceil, comb
+
+import numpy as np
+from numpy.typing import NDArray
+
+from respot.registration.rigid import transform_of
+
+Array = NDArray[np.float64]
+
+TRIALS = 1000  # half of the pairs wrong: the chance to miss three good ones 1000 times is below 1e-57
+_KEPT, _STEPS, _SCORED_ROWS = 5, 3, 2000
+
+
+def consensus_transform(source: Array, reference: Array, *, seed: int, trials: int = TRIALS) -> tuple[Array, Array]:
+    """Rotation and translation that the closest 45 % of the pairs agree on best.
+
+    All triples are tried where they are no more than ``trials``, else ``trials`` random ones drawn with ``seed``.
+    Rows are put into an order of their own first, so that the order of the table plays no part.
+
+    Parameters
+    ----------
+    source, reference : (n, 3) arrays, n >= 4 [mm]
+    """
+    order = np.lexsort(np.hstack([source, reference]).T)
+    rng = np.random.default_rng(seed)
+    if len(order) > _SCORED_ROWS:
+        order = rng.choice(order, _SCORED_ROWS, replace=False)
+    source, reference = source[order], reference[order]
+    n = len(source)
+    quota = min(max(ceil(0.45 * n), 4), n)
+    if comb(n, 3) <= trials:
+        triples = np.array(list(combinations(range(n), 3)))
+    else:
+        triples = np.argsort(rng.random((trials, n)), axis=1)[:, :3] if n <= 50 else _distinct(rng, n, trials)
+    rotations, translations = transform_of(source[triples], reference[triples])
+    squares = _squares(rotations, translations, source, reference)
+    best = np.argsort(np.partition(squares, quota - 1, axis=1)[:, quota - 1], kind="stable")[:_KEPT]
+    squares = squares[best]
+    for _ in range(_STEPS):
+        nearest = np.argpartition(squares, quota - 1, axis=1)[:, :quota]
+        rotations, translations = transform_of(source[nearest], reference[nearest])
+        squares = _squares(rotations, translations, source, reference)
+    winner = int(np.argmin(np.partition(squares, quota - 1, axis=1)[:, :quota].sum(axis=1)))
+    return rotations[winner], translations[winner]
+
+
+def _distinct(rng: np.random.Generator, n: int, trials: int) -> NDArray[np.intp]:
+    """Triples (trials, 3) of three different rows each."""
+    first = rng.integers(0, n, trials)
+    second = (first + rng.integers(1, n, trials)) % n
+    third = rng.integers(0, n - 2, trials)
+    third += third >= np.minimum(first, second)
+    third += third >= np.maximum(first, second)
+    return np.stack([first, second, third], axis=1)
+
+
+def _squares(rotations: Array, translations: Array, source: Array, reference: Array) -> Array:
+    """Squared residual lengths (b, n) of b transforms."""
+    predicted = np.einsum("bij,nj->bni", rotations, source) + translations[:, None, :]
+    squares: Array = np.sum((predicted - reference) ** 2, axis=-1)
+    return squares
