@@ -1,13 +1,17 @@
-"""The one place for numeric tolerances and for how a changed number is rounded."""
+"""The one place for numeric tolerances and for how a changed number is rounded and spelled."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
+from decimal import Decimal
 
 #: Decimals that a changed number gets at least, whatever its source had (DESIGN section 4, precision).
 LENGTH_DECIMALS = 3
 ANGLE_DECIMALS = 4
 QUATERNION_DECIMALS = 7
+#: No changed number gets more decimals than a double can hold next to a metre.
+MOST_DECIMALS = 12
 
 #: Below these a target counts as not moved: no number on a controller resolves them.
 SAME_POSITION_MM = 1e-9
@@ -16,33 +20,63 @@ SAME_ROTATION_DEG = 1e-9
 #: |q| of a programmed quaternion may differ from 1 by this much; pendants print six digits.
 QUATERNION_NORM = 1e-3
 
+_NUMBER = re.compile(r"([+-]?)(\s*)([0-9]*)(\.?)([0-9]*)(?:([eE])([+-]?)([0-9]+))?")
+
 
 @dataclass(frozen=True)
 class NumberStyle:
-    """How a number is spelled in its source.
+    """How a number is spelled in its source: all that `spell` needs to write it again, digit by digit.
 
     Parameters
     ----------
     decimals : int
-        Digits after the point.
-    plain_integer : bool
-        Spelled without a point, as simulation systems write ``0``.
+        Digits after the point of the mantissa.
+    point : bool
+        There is a point; ``1.`` has one without decimals.
+    digits : int
+        Digits before the point at least: 0 for ``.5``, 2 for ``07``.
+    exponent : str
+        The exponent as written, e.g. ``E+09``; empty if none.
+    sign : str
+        A written ``+`` or, for a negative zero, ``-``.
+    gap : str
+        Blanks between sign and digits.
     """
 
     decimals: int
-    plain_integer: bool = False
+    point: bool = True
+    digits: int = 1
+    exponent: str = ""
+    sign: str = ""
+    gap: str = ""
 
     @classmethod
     def of(cls, text: str) -> NumberStyle:
-        """Style of a number token. An exponent counts: ``-8.62E-05`` has 7 decimals."""
-        mantissa, _, exponent = text.strip().lower().partition("e")
-        _, point, fraction = mantissa.partition(".")
-        decimals = len(fraction) - (int(exponent) if exponent else 0)
-        return cls(max(decimals, 0), plain_integer=not point and not exponent)
+        """Style of a number token.
+
+        Raises
+        ------
+        ValueError
+            The text is no decimal number.
+        """
+        match = _NUMBER.fullmatch(text)
+        if match is None or not (match[3] or match[5]):
+            raise ValueError(f"{text!r} is no number")
+        sign, gap, whole, point, fraction, letter, exponent_sign, exponent = match.groups(default="")
+        zero = not (whole + fraction).strip("0")
+        return cls(
+            decimals=len(fraction),
+            point=bool(point),
+            digits=len(whole) if whole.startswith("0") or not whole else 1,
+            exponent=letter + exponent_sign + exponent,
+            sign=sign if sign == "+" or zero else "",
+            gap=gap,
+        )
 
     def at_least(self, decimals: int) -> NumberStyle:
-        """Give the style for a changed number: the source's decimals, but never fewer than asked for."""
-        return NumberStyle(max(self.decimals, decimals))
+        """Style for a changed number: the source's decimals, but never fewer than asked for and without exponent."""
+        own = self.decimals - int(self.exponent[1:] or 0) if self.exponent else self.decimals
+        return NumberStyle(min(max(own, decimals), max(MOST_DECIMALS, decimals)))
 
     @property
     def half_digit(self) -> float:
@@ -50,11 +84,21 @@ class NumberStyle:
         return 0.5 * 10.0**-self.decimals
 
 
-def spell(value: float, style: NumberStyle) -> str:
-    """Write ``value`` in ``style``; never ``-0.000``, never an exponent.
+def spell(value: Decimal | float, style: NumberStyle) -> str:
+    """Write ``value`` in ``style``; a rounded negative zero loses its sign.
 
     >>> spell(-0.00001, NumberStyle(3))
     '0.000'
+    >>> spell(Decimal("9E+09"), NumberStyle.of("9E+09"))
+    '9E+09'
     """
-    text = f"{value:.{style.decimals}f}"
-    return text.lstrip("-") if float(text) == 0.0 else text
+    exact = value if isinstance(value, Decimal) else Decimal(repr(float(value)))
+    if style.exponent:
+        exact = exact.scaleb(-int(style.exponent[1:]))
+    text = f"{exact.copy_abs():.{style.decimals}f}"
+    negative = exact < 0 and bool(text.strip("0."))
+    whole, _, fraction = text.partition(".")
+    whole = whole.rjust(style.digits, "0") if style.digits else whole.lstrip("0")
+    sign = "-" if negative else style.sign
+    return f"{sign}{style.gap}{whole}{'.' if style.point else ''}{fraction}{style.exponent}"
+

@@ -28,7 +28,8 @@ def unit_covariance(points: Array) -> tuple[Array, Array]:
     """
     centroid = points.mean(axis=0)
     rows = jacobian(points - centroid).reshape(-1, 6)
-    return np.linalg.inv(rows.T @ rows), centroid
+    covariance = np.asarray(np.linalg.inv(rows.T @ rows), dtype=np.float64)
+    return covariance, np.asarray(centroid, dtype=np.float64)
 
 
 def jacobian(offsets: Array) -> Array:

@@ -7,8 +7,10 @@ A cycle is accepted only if all of these hold, judged by the least-squares fit o
 own members, so that none of them takes part in its own trial (a held-out prediction; t is 99.9 % of chi with 3 degrees
 of freedom times the robust scale, widened by each member's leverage):
 
-1. as named, every member misses its place by more than t;
-2. with the names repaired, every member meets its place within t;
+1. as named, every member misses its place by more than t, and by more than t would be if the noise along every axis
+   were that of the inliers' widest (along a flange spots are spaced by hand: near neighbours must not pass for exchanged);
+2. with the names repaired, every member meets its place within t, or (noise is rarely the same along all axes) within
+   2 t and a quarter of what it missed as named;
 3. the RMS over the members falls to `GAIN` or less of what it was;
 4. the leave-one-out RMS of the whole table (least squares, all pairs) falls;
 5. at least `WITNESSES` other inliers, not on a line, are left to judge by.
@@ -30,13 +32,14 @@ from respot.registration.errors import RegistrationError
 from respot.registration.leave_one_out import leave_one_out
 from respot.registration.permutation import placement_p_value
 from respot.registration.rigid import check_pairs, fit_rigid
-from respot.registration.robust import RobustFit, fit_robust
-from respot.registration.statistics import rms
+from respot.registration.robust import INLIER_CHI, RobustFit, fit_robust
+from respot.registration.statistics import residual_directions, rms
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 GAIN = 0.5
+CLEAR_GAIN, CLEAR_REACH = 0.25, 2.0
 WITNESSES = 4
 _ROUNDS = 10
 
@@ -137,7 +140,7 @@ def _candidates(source: Array, reference: Array, robust: RobustFit) -> list[Rows
         return []
     predicted = robust.rigid.predict(source[suspects])
     squares = np.sum((predicted[:, None, :] - reference[suspects][None, :, :]) ** 2, axis=-1)
-    limit = (2.0 * robust.threshold) ** 2  # room for the members' own pull and leverage; the trial is exact
+    limit = (CLEAR_REACH * robust.threshold) ** 2  # the trial that follows is the strict one
     cost = np.minimum(squares, limit)
     np.fill_diagonal(cost, np.minimum(np.diag(squares), 0.99 * limit))  # a tie keeps its name
     _, columns = linear_sum_assignment(cost)
@@ -168,7 +171,7 @@ class _Trial:
 
 
 def _judge(source: Array, reference: Array, robust: RobustFit, cycle: Rows) -> _Trial | None:
-    """The trial of one cycle by the five conditions of the module's head; None if it fails one."""
+    """Try one cycle by the five conditions of the module's head; None if it fails one."""
     trial = _try(source, reference, robust, cycle)
     if trial is None:
         return None
@@ -176,9 +179,11 @@ def _judge(source: Array, reference: Array, robust: RobustFit, cycle: Rows) -> _
     witnesses[cycle] = False
     fitted = robust.rigid.predict(source[witnesses])
     limits = robust.threshold * np.sqrt(1.0 + leverage(robust.rigid.predict(source[cycle]), fitted))
+    widest = INLIER_CHI * float(residual_directions(robust.rigid.residuals[witnesses]).sd[0])
+    reach = np.maximum(limits, np.minimum(CLEAR_REACH * limits, CLEAR_GAIN * trial.before))
     clear = (
-        bool(np.all(trial.before > limits))
-        and bool(np.all(trial.after <= limits))
+        bool(np.all(trial.before > np.maximum(limits, widest)))
+        and bool(np.all(trial.after <= reach))
         and float(np.linalg.norm(trial.after)) <= GAIN * float(np.linalg.norm(trial.before))
         and trial.loo_after < trial.loo_before
     )
@@ -210,7 +215,7 @@ def _try(source: Array, reference: Array, robust: RobustFit, cycle: Rows) -> _Tr
 def _evidence(
     ids: Sequence[str], source: Array, reference: Array, permutation: Rows, robust: RobustFit, cycle: Rows, seed: int
 ) -> Exchange:
-    """The record of an accepted cycle, with every other accepted cycle repaired."""
+    """Record an accepted cycle, with every other accepted cycle repaired."""
     others = permutation.copy()
     others[cycle] = cycle
     trial = _try(source, reference[others], robust, cycle)

@@ -1,4 +1,4 @@
-"""A permutation test for a renaming: could the same residuals be renamed away wherever they lay?"""
+"""A permutation test for a renaming: whether the same residuals could be renamed away wherever they lay."""
 
 from __future__ import annotations
 

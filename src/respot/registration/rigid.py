@@ -62,7 +62,7 @@ class RigidFit:
 
 
 def homogeneous(rotation: Array, translation: Array) -> Array:
-    """The (4, 4) matrix of a rotation and a translation [mm]."""
+    """Build the (4, 4) matrix of a rotation and a translation [mm]."""
     matrix = np.eye(4)
     matrix[:3, :3] = rotation
     matrix[:3, 3] = translation

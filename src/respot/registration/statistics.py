@@ -66,7 +66,7 @@ class ResidualDirections:
 def residual_directions(residuals: Array) -> ResidualDirections:
     """Principal axes and standard deviations of residual vectors.
 
-    Eigenvectors of the scatter matrix of the centred residuals, over n: the spread of these spots, no estimate beyond them.
+    Eigenvectors of the scatter matrix of the centred residuals over n: the spread of these spots, nothing beyond them.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Do the data support a rotation at all, or does a translation say as much?"""
+"""Whether the data support a rotation at all, or a translation says as much."""
 
 from __future__ import annotations
 

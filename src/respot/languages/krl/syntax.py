@@ -75,3 +75,16 @@ def read_statements(text: str, line_starts: list[int]) -> list[Statement]:
             shape = parts[0].shape
         statements.append(Statement(text, start, start + len(line), number, shape))
     return statements
+
+
+_FIRST_WORD = re.compile(r"(?:GLOBAL\s+)?(?:DEF|DEFFCT|DEFDAT)\b", re.IGNORECASE)
+
+
+def looks_like_krl(text: str) -> bool:
+    """Whether a file with the suffix of KRL holds KRL."""
+    for line in text.splitlines():
+        line = line.strip()
+        if not line or line[0] in ";&":
+            continue
+        return _FIRST_WORD.match(line) is not None
+    return False

@@ -28,7 +28,24 @@ COMMENT, AFTER_MODULE = "comment", "after_module"
 
 #: Block words that are whole statements.
 _WORDS = frozenset(
-    ["ENDMODULE", "ENDPROC", "ENDFUNC", "ENDTRAP", "ENDRECORD", "ENDIF", "ENDFOR", "ENDWHILE", "ENDTEST", "ELSE", "UNDO", "BACKWARD", "<SMT>", "<DDN>", "<TDN>", "<RDN>"]
+    [
+        "ENDMODULE",
+        "ENDPROC",
+        "ENDFUNC",
+        "ENDTRAP",
+        "ENDRECORD",
+        "ENDIF",
+        "ENDFOR",
+        "ENDWHILE",
+        "ENDTEST",
+        "ELSE",
+        "UNDO",
+        "BACKWARD",
+        "<SMT>",
+        "<DDN>",
+        "<TDN>",
+        "<RDN>",
+    ]
 )
 _ENDS_WITH = {"ELSEIF": "THEN", "FOR": "DO", "WHILE": "DO", "CASE": ":", "DEFAULT": ":"}
 _MODIFIERS = frozenset(("LOCAL", "TASK"))

@@ -1,0 +1,62 @@
+"""How sure the rigid transform is: covariance and 95 % intervals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from respot.registration.covariance import unit_covariance
+
+Array = NDArray[np.float64]
+
+PARAMETERS = ("tx", "ty", "tz", "rx", "ry", "rz")
+
+
+@dataclass(frozen=True, eq=False)
+class TransformUncertainty:
+    """Covariance of a rigid transform, as a left perturbation about the centroid of the inliers.
+
+    The true transform is the fitted one followed by a turn by the rotation vector ``(rx, ry, rz)`` about ``centroid``
+    and a shift by ``(tx, ty, tz)``, all along the axes of the reference frame. Given the choice of inliers and names.
+
+    Attributes
+    ----------
+    covariance : (6, 6) array
+        Of tx, ty, tz [mm] and rx, ry, rz [deg].
+    centroid : (3,) array
+        Mean of the calibrated inliers, reference frame [mm].
+    sigma : float
+        Noise per coordinate, sqrt(SSR / (3n - 6)) [mm].
+    degrees_of_freedom : int
+        3n - 6.
+    half_width : (6,) array
+        Half of each 95 % interval, by Student's t [mm, deg].
+    """
+
+    covariance: Array
+    centroid: Array
+    sigma: float
+    degrees_of_freedom: int
+    half_width: Array
+
+
+def transform_uncertainty(points: Array, residuals: Array) -> TransformUncertainty:
+    """Uncertainty of the least-squares rigid transform, for noise that is the same along all axes.
+
+    Parameters
+    ----------
+    points : (n, 3) array, n >= 3
+        Calibrated inliers, reference frame [mm].
+    residuals : (n, 3) array
+        Their residuals [mm].
+    """
+    free = 3 * len(points) - 6
+    variance = float(np.sum(residuals**2)) / free
+    covariance, centroid = unit_covariance(points)
+    units = np.array([1.0, 1.0, 1.0, 180.0 / np.pi, 180.0 / np.pi, 180.0 / np.pi])
+    covariance = variance * covariance * np.outer(units, units)
+    half_width = float(stats.t.ppf(0.975, free)) * np.sqrt(np.diag(covariance))
+    return TransformUncertainty(covariance, centroid, float(np.sqrt(variance)), free, half_width)

@@ -1,0 +1,44 @@
+"""Tools and bases as a program names them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from scipy.spatial.transform import RigidTransform
+
+from respot.geometry import IDENTITY
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A tool (TCP seen from the flange) or a base, work object (seen from the world).
+
+    Parameters
+    ----------
+    name : str
+        As the program refers to it: ``BASE_DATA[1]``, ``wobj_door``.
+    label : str
+        The name people gave it: ``BASE_NAME[1,]``; empty where there is none.
+    pose : RigidTransform or None
+        ``base2world`` or ``tool2flange``; None where it is not known before the robot runs.
+    unknown : str
+        Why the pose is not known.
+    path, line :
+        Where it is declared.
+    world : bool
+        It is the world itself (base 0, wobj0) or the flange (tool 0, tool0).
+    held : bool
+        The robot carries it. A held base and a fixed tool make an external TCP.
+    """
+
+    name: str
+    label: str = ""
+    pose: RigidTransform | None = IDENTITY
+    unknown: str = ""
+    path: str | None = None
+    line: int | None = None
+    world: bool = False
+    held: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.name} {self.label}".rstrip()

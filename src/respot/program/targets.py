@@ -1,0 +1,73 @@
+"""Targets: programmed poses and joint positions, with the place of each of their numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from decimal import Decimal
+from enum import StrEnum
+
+from scipy.spatial.transform import RigidTransform
+
+from respot.source import Span
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number of a program: its exact value and its place, sign included."""
+
+    value: Decimal
+    span: Span
+
+
+class TargetKind(StrEnum):
+    """What a target fixes."""
+
+    POSE = "pose"
+    JOINTS = "joints"
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """A literal position of a program. Two motions to the same declared point share one target.
+
+    Parameters
+    ----------
+    name : str
+        Its declared name, or for a literal in the code the motion it stands in, e.g. ``SpotL@41``.
+    kind : TargetKind
+        Pose or joints.
+    path : str
+        File of the literal.
+    line, column : int
+        Its place, from 1.
+    span : tuple
+        Span of the literal in the file.
+    numbers : mapping of str to Number
+        Field names of its language: ``X`` .. ``E6`` in KRL, ``x`` .. ``eax_f`` in RAPID.
+    pose : RigidTransform or None
+        The pose in its base (``target2base``); None for joints and where a field is no number.
+    unknown : str
+        Why there is no pose.
+    declared : bool
+        It has a name of its own.
+    """
+
+    name: str
+    kind: TargetKind
+    path: str
+    line: int
+    column: int
+    span: Span
+    numbers: Mapping[str, Number] = field(default_factory=dict)
+    pose: RigidTransform | None = None
+    unknown: str = ""
+    declared: bool = True
+
+    def number(self, name: str) -> float | None:
+        """Value of a field, None where the literal lacks it."""
+        found = self.numbers.get(name)
+        return None if found is None else float(found.value)
+
+    def __str__(self) -> str:
+        return self.name
