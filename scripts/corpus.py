@@ -23,6 +23,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from respot.languages.krl import syntax as krl
+from respot.languages.rapid import syntax as rapid
+from respot.languages.rapid.recognition import looks_like_rapid
 from respot.program.statement import OPAQUE, Node, Statement
 from respot.source import SourceText
 
@@ -52,6 +54,27 @@ def _krl_literals(statement: Statement) -> Iterator[Literal]:
             yield name[0].text.upper(), tuple(_numbers(node.nodes[-1]))
 
 
+#: Members of a robtarget and of a jointtarget, by how many numbers they hold.
+_RAPID_LITERALS = ([3, 4, 4, 6], [6, 6])
+
+
+def _rapid_literals(statement: Statement) -> Iterator[Literal]:
+    if "[" not in statement.source or statement.shape.tree is None:
+        return
+    for node in statement.node.walk():
+        if node.kind == "aggregate" and [len(member.nodes) for member in node.nodes] in _RAPID_LITERALS:
+            numbers = tuple(_numbers(node))
+            if len(numbers) == sum(len(member.nodes) for member in node.nodes):
+                yield "", numbers
+
+
+def _rapid_literal() -> re.Pattern[str]:
+    """Pattern of a robtarget or jointtarget that is written in numbers, wherever it stands."""
+    number = r"\s*[+-]?\s*(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?\s*"
+    members = (r"\s*,\s*".join(rf"\[{','.join([number] * count)}\]" for count in counts) for counts in _RAPID_LITERALS)
+    return re.compile(rf"(?P<name>)\[\s*(?P<body>{'|'.join(members)})\s*\]")
+
+
 def _numbers(node: Node) -> Iterator[float]:
     """Every number below a node with its sign, in the order of the text."""
     for child in node.nodes:
@@ -78,6 +101,16 @@ LANGUAGES = {
             re.IGNORECASE,
         ),
         _krl_literals,
+    ),
+    "rapid": Language(
+        frozenset((".mod", ".modx", ".sys", ".sysx", ".prg")),
+        rapid.ENCODINGS,
+        lambda data, source: looks_like_rapid(data),
+        rapid.read_statements,
+        rapid.NO_STATEMENT,
+        "!",
+        _rapid_literal(),
+        _rapid_literals,
     ),
 }
 _NUMBER = re.compile(r"(?<![\w.])[+-]?\s*(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?(?![\w.])")
@@ -132,7 +165,9 @@ def read_file(path: str, data: bytes, language: Language) -> Counts:
         if statement.kind == OPAQUE:
             counts.opaque += 1
             counts.reasons[statement.shape.reason] += 1
-            counts.notes.append(f"opaque      {path}:{statement.line}: {statement.source[:160]}  [{statement.shape.reason}]")
+            counts.notes.append(
+                f"opaque      {path}:{statement.line}: {statement.source[:160]}  [{statement.shape.reason}]"
+            )
     counts.touched = int(counts.opaque > 0)
     if counts.opaque * 10 > counts.statements:
         counts.broken = 1
@@ -233,7 +268,9 @@ def files(path: Path, suffixes: frozenset[str]) -> Iterator[tuple[str, bytes]]:
 def _git_files(path: Path, suffixes: frozenset[str]) -> Iterator[tuple[str, bytes]]:
     listing = subprocess.run(["git", "-C", path, "ls-tree", "-rz", "HEAD"], capture_output=True, check=True).stdout
     entries = [entry.split(b"\t", 1) for entry in listing.split(b"\0") if entry]
-    wanted = [(head.split()[2], name.decode()) for head, name in entries if Path(name.decode()).suffix.lower() in suffixes]
+    wanted = [
+        (head.split()[2], name.decode()) for head, name in entries if Path(name.decode()).suffix.lower() in suffixes
+    ]
     with subprocess.Popen(
         ["git", "-C", path, "cat-file", "--batch"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
     ) as process:
@@ -252,7 +289,18 @@ def _git_files(path: Path, suffixes: frozenset[str]) -> Iterator[tuple[str, byte
         process.stdin.close()
 
 
-_COLUMNS = ("files", "other", "touched", "broken", "bytes", "statements", "opaque", "no_roundtrip", "literals", "missing")
+_COLUMNS = (
+    "files",
+    "other",
+    "touched",
+    "broken",
+    "bytes",
+    "statements",
+    "opaque",
+    "no_roundtrip",
+    "literals",
+    "missing",
+)
 
 
 def _row(name: str, counts: Counts) -> str:

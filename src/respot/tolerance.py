@@ -101,4 +101,3 @@ def spell(value: Decimal | float, style: NumberStyle) -> str:
     whole = whole.rjust(style.digits, "0") if style.digits else whole.lstrip("0")
     sign = "-" if negative else style.sign
     return f"{sign}{style.gap}{whole}{'.' if style.point else ''}{fraction}{style.exponent}"
-

@@ -1,34 +1,47 @@
 """One fine Lark grammar a language, parsed once per shape of statement.
 
-Public KRL has 228,000 lines but 9,000 shapes (DESIGN section 4). A piece of text is looked up under two keys: first with
-every run of digits replaced by one, which costs a single substitution and finds the rows of a point table; then by its
-token kinds, where names that are no keywords, numbers and strings stand for each other. Only a shape that neither key
-knows goes through Lark. The tree keeps token positions, so that any statement of the shape can lay it over its own text.
+Public KRL has 228,000 lines but 9,000 shapes (DESIGN section 4). A piece of text is looked up under two keys: first
+with every run of digits replaced by one, which a single substitution does for a whole file and which finds the rows of
+a point table; then by its token kinds, where names that are no keywords, numbers and strings stand for each other. Only
+a shape that neither key knows goes through Lark. The tree keeps token positions, so that any statement of the shape can
+lay it over its own text.
 """
 
 from __future__ import annotations
 
 import re
+from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Generic, TypeVar
 
 from lark import Lark, Token, Tree
-from lark.exceptions import UnexpectedCharacters, UnexpectedEOF, UnexpectedInput, UnexpectedToken
+from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
 
-from respot.program.statement import OPAQUE, Branch, Leaf, Shape
+from respot.program.statement import OPAQUE, Branch, Leaf, Lexicon, Shape
 from respot.resources import resource
 from respot.source import Span
 
 #: A longer statement is kept as it is: no hand wrote it, and one line may not stall the reader.
 LONGEST_STATEMENT = 64 * 1024
-#: Entries of each key's cache; a backup of a whole line stays far below.
+#: Entries of each cache, and characters of their keys; a backup of a whole line stays far below.
 MOST_SHAPES = 50_000
+MOST_CHARACTERS = 16_000_000
 #: Deeper nesting is kept as it is: trees are walked by recursion.
 DEEPEST_NESTING = 100
+DEEPEST_TREE = 250
+#: Longer tokens are strings, whose kind is not worth keeping.
+_LONGEST_WORD = 40
 
 #: Numbers with a base are one run: ``0b12`` is two tokens, ``0b11`` one.
 _DIGITS = re.compile(r"0[xX][0-9A-Fa-f]+|0[oO][0-7]+|0[bB][01]+|[0-9]+")
+_PLAIN_DIGITS = re.compile(r"[0-9]+")
+#: A line with its end, as `respot.source.NEWLINE` cuts them.
+_LINE = re.compile(r"[^\r\n]*(?:\r*\n|\r)|[^\r\n]+\Z")
+
+#: Names of the groups of a token pattern whose tokens stand for each other, and their kinds.
+_CLASSES = {"name": "a", "number": "0", "string": '"'}
 
 
 @dataclass(frozen=True)
@@ -46,6 +59,42 @@ Unit = tuple[Part, ...] | None
 #: Cuts a unit's tokens into statements; gets kinds (see `Shapes.kinds`), returns token ranges or None if incomplete.
 Splitter = Callable[[list[str]], list[Span] | None]
 
+_T = TypeVar("_T")
+
+
+class Cache(dict[str, _T], Generic[_T]):
+    """A dictionary that is emptied before it grows too large."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._characters = 0
+
+    def keep(self, key: str, value: _T) -> None:
+        """Store a value unless its key is very long."""
+        if len(key) > LONGEST_STATEMENT // 8:
+            return
+        if len(self) >= MOST_SHAPES or self._characters > MOST_CHARACTERS:
+            self.clear()
+            self._characters = 0
+        self._characters += len(key)
+        self[key] = value
+
+
+class _Kinds(dict[str, str]):
+    """Kind of every token met so far: most tokens of a program are met again and again."""
+
+    def __init__(self, kind: Callable[[str], str]) -> None:
+        super().__init__()
+        self._kind = kind
+
+    def __missing__(self, token: str) -> str:
+        kind = self._kind(token)
+        if kind and len(token) <= _LONGEST_WORD:
+            if len(self) >= MOST_SHAPES:
+                self.clear()
+            self[token] = kind
+        return kind
+
 
 class Shapes:
     """The shapes of one language.
@@ -57,8 +106,9 @@ class Shapes:
     start : str
         Start rule of one statement.
     token : re.Pattern
-        Finds every token; group 1 (unnamed or ``comment``) is a comment, the groups ``number``, ``name`` and ``string``
-        follow; any other match is a literal. A test holds it equal to Lark's own lexer.
+        Finds every token. The group ``comment``, which comes first, is a comment; the groups ``number``, ``name`` and
+        ``string`` and any further named group hold tokens that stand for each other; any other match is a literal. A
+        test holds it equal to Lark's own lexer.
     split : Splitter
         Cuts a unit into statements.
     """
@@ -68,9 +118,12 @@ class Shapes:
         self._start = start
         self.token = token
         self._split = split
-        self._units: dict[str, Unit] = {}
+        self._digits = _DIGITS if re.search(r"0\[xX\]", token.pattern) else _PLAIN_DIGITS
+        self._units: Cache[Unit] = Cache()
         self._parts: dict[tuple[str, ...], Shape] = {}
-        self._spans_only = _comment_only(token)
+        self._lexicon = _lexicon(token)
+        self._words = re.compile(_without_groups(token.pattern), token.flags)
+        self._kinds = _Kinds(self._kind)
 
     @cached_property
     def lark(self) -> Lark:
@@ -87,125 +140,186 @@ class Shapes:
                 words.update(word.lower() for word in re.findall(r"(?<![\\\w])[A-Za-z_]\w*", terminal.pattern.value))
         return frozenset(words)
 
-    def unit(self, text: str) -> Unit:
-        """Statements of a run of lines without its last line end; None if it ends inside a statement."""
-        key = _DIGITS.sub("0", text)
+    def keys(self, text: str) -> list[str]:
+        """Every line of a file, with its end, every run of digits replaced by one.
+
+        Lines with the same key have the same tokens at the same place from either end, apart from the digits.
+        """
+        return _LINE.findall(self._digits.sub("0", text))
+
+    def unit(self, text: str, key: str | None = None) -> Unit:
+        """Statements of a run of lines without its last line end; None if it ends inside a statement.
+
+        Parameters
+        ----------
+        text : str
+            The lines.
+        key : str, optional
+            Their key, where it is known from `keys`.
+        """
+        if key is None:
+            key = self._digits.sub("0", text)
         try:
             return self._units[key]
         except KeyError:
             pass
-        unit = self._read(text)
-        if len(self._units) >= MOST_SHAPES:
-            self._units.clear()
-        if len(key) <= LONGEST_STATEMENT:
-            self._units[key] = unit
+        unit = self.read(text)
+        self._units.keep(key, unit)
         return unit
 
-    def opaque(self, reason: str) -> Shape:
-        """Shape of a statement that is kept as it is."""
-        return Shape(OPAQUE, None, reason, self._spans_only)
-
-    def plain(self, kind: str) -> Shape:
-        """Shape of a line that has no tree, such as a comment."""
-        return Shape(kind, None, "", self._spans_only)
-
-    def _read(self, text: str) -> Unit:
-        kinds, spans = self.kinds(text)
+    def read(self, text: str) -> Unit:
+        """Statements of a run of lines, looked up by their kinds alone."""
+        kinds = list(map(self._kinds.__getitem__, self._words.findall(text)))
+        if "" in kinds:
+            kinds = [kind for kind in kinds if kind]
         ranges = self._split(kinds)
         if ranges is None:
             return None
-        return tuple(Part(first, last, self._shape(text, kinds, spans, first, last)) for first, last in ranges)
+        return tuple(Part(first, last, self._shape(text, kinds, first, last)) for first, last in ranges)
+
+    def opaque(self, reason: str) -> Shape:
+        """Shape of a statement that is kept as it is."""
+        return Shape(OPAQUE, None, reason, self._lexicon)
+
+    def plain(self, kind: str) -> Shape:
+        """Shape of a line that has no tree, such as a comment."""
+        return Shape(kind, None, "", self._lexicon)
 
     def kinds(self, text: str) -> tuple[list[str], list[Span]]:
         """Kinds and spans of the tokens of a text, comments left out.
 
-        A kind is ``0`` for a number, ``a`` for a name, ``"`` for a string; keywords and literals stand for themselves,
-        in upper case.
+        A kind is ``0`` for a number, ``a`` for a name, ``"`` for a string, and the name of the group for any other
+        named group of the token pattern; keywords and literals stand for themselves, in upper case.
         """
         kinds: list[str] = []
         spans: list[Span] = []
-        keywords = self.keywords
-        for match in self.token.finditer(text):
-            group = match.lastgroup
-            if group == "comment":
-                continue
-            if group == "name":
-                word = match.group()
-                kinds.append(word.upper() if word.lower() in keywords else "a")
-            elif group == "number":
-                kinds.append("0")
-            elif group == "string":
-                kinds.append('"')
-            else:
-                kinds.append(match.group().upper())
-            spans.append(match.span())
+        for match in self._words.finditer(text):
+            kind = self._kinds[match.group()]
+            if kind:
+                kinds.append(kind)
+                spans.append(match.span())
         return kinds, spans
 
-    def _shape(self, text: str, kinds: list[str], spans: list[Span], first: int, last: int) -> Shape:
+    def _kind(self, token: str) -> str:
+        """Kind of a token, empty for a comment."""
+        match = self.token.fullmatch(token)
+        group = None if match is None else match.lastgroup
+        if group == "comment":
+            return ""
+        if group is None or (group == "name" and token.lower() in self.keywords):
+            return token.upper()
+        return _CLASSES.get(group, group)
+
+    def _shape(self, text: str, kinds: list[str], first: int, last: int) -> Shape:
         key = tuple(kinds[first : last + 1])
         shape = self._parts.get(key)
         if shape is None:
+            _, spans = self.kinds(text)
             base = spans[first][0]
             own = [(start - base, end - base) for start, end in spans[first : last + 1]]
-            shape = self._parse(text[base : spans[last][1]], own)
+            shape = self._parse(text[base : spans[last][1]], own, key)
             if len(self._parts) >= MOST_SHAPES:
                 self._parts.clear()
             self._parts[key] = shape
         return shape
 
-    def _parse(self, text: str, spans: list[Span]) -> Shape:
+    def _parse(self, text: str, spans: list[Span], kinds: tuple[str, ...]) -> Shape:
         if len(text) > LONGEST_STATEMENT:
             return self.opaque(f"longer than {LONGEST_STATEMENT // 1024} kB")
-        if _nesting(text) > DEEPEST_NESTING:
+        if _nesting(kinds) > DEEPEST_NESTING:
             return self.opaque(f"nested deeper than {DEEPEST_NESTING}")
+        starts = {start: position for position, (start, _) in enumerate(spans)}
         try:
             tree = self.lark.parse(text, start=self._start)
         except UnexpectedInput as error:
-            return self.opaque(_reason(error))
-        starts = {start: index for index, (start, _) in enumerate(spans)}
-        ends = {end: index for index, (_, end) in enumerate(spans)}
-        try:
-            branch = _branch(tree, starts, ends)
-        except RecursionError:
-            return self.opaque("an expression of too many terms")
-        return Shape(branch.kind, branch, "", self._spans_only)
+            fault = None if _at_end(error) else _covering(spans, error.pos_in_stream or 0)
+            reason = "ends too early" if _at_end(error) else f"{_described(kinds, fault)} is not expected here"
+            return Shape(OPAQUE, None, reason, self._lexicon, kinds, fault)
+        branch = _branch(tree, starts, {end: position for position, (_, end) in enumerate(spans)})
+        if branch is None:
+            return self.opaque(f"a tree deeper than {DEEPEST_TREE}")
+        return Shape(branch.kind, branch, "", self._lexicon, kinds)
 
 
-def _branch(tree: Tree[Token], starts: dict[int, int], ends: dict[int, int]) -> Branch:
+def _branch(tree: Tree[Token], starts: dict[int, int], ends: dict[int, int], depth: int = 0) -> Branch | None:
+    """Lay a tree over token positions; None if it is too deep to be walked by recursion."""
+    if depth > DEEPEST_TREE:
+        return None
     children: list[Branch | Leaf] = []
     for child in tree.children:
         if isinstance(child, Tree):
-            children.append(_branch(child, starts, ends))
+            below = _branch(child, starts, ends, depth + 1)
+            if below is None:
+                return None
+            children.append(below)
         elif child is not None:
-            assert child.start_pos is not None
-            children.append(Leaf(starts[child.start_pos], child.type))
+            children.append(Leaf(starts[child.start_pos or 0], child.type))
     if tree.meta.empty:
         return Branch(str(tree.data), tuple(children), -1, -1)
     return Branch(str(tree.data), tuple(children), starts[tree.meta.start_pos], ends[tree.meta.end_pos])
 
 
-def _nesting(text: str) -> int:
+def _nesting(kinds: tuple[str, ...]) -> int:
     deepest = depth = 0
-    for character in text:
-        if character in "([{":
+    for kind in kinds:
+        if kind in "([{":
             depth += 1
             deepest = max(deepest, depth)
-        elif character in ")]}":
+        elif kind in ")]}":
             depth -= 1
     return deepest
 
 
-def _reason(error: UnexpectedInput) -> str:
+def _at_end(error: UnexpectedInput) -> bool:
     if isinstance(error, UnexpectedCharacters):
-        return f"no token begins with {error.char!r}"
-    if isinstance(error, UnexpectedToken) and error.token.type != "$END":
-        return f"{str(error.token)!r} is not expected here"
-    if isinstance(error, UnexpectedEOF | UnexpectedToken):
-        return "ends too early"
-    return "not understood"
+        return False
+    return not isinstance(error, UnexpectedToken) or error.token.type == "$END"
 
 
-def _comment_only(token: re.Pattern[str]) -> re.Pattern[str]:
-    """Token pattern in which only a comment sets a group."""
-    pattern = re.sub(r"\(\?P<(?!comment>)\w+>", "(?:", token.pattern)
-    return re.compile(pattern, token.flags)
+def _covering(spans: list[Span], offset: int) -> int:
+    """Position of the token at an offset, or before it."""
+    return max(0, bisect_right(spans, (offset, len(spans) + offset)) - 1)
+
+
+def _described(kinds: tuple[str, ...], position: int | None) -> str:
+    """Name a token that all statements of a shape share: a reason must fit each of them."""
+    if position is None:
+        return "a character"
+    kind = kinds[position]
+    return {"a": "a name", "0": "a number", '"': "a string"}.get(kind, kind if kind.islower() else repr(kind))
+
+
+def _lexicon(token: re.Pattern[str]) -> Lexicon:
+    groups = {name: _group(token.pattern, name) for name in token.groupindex}
+    comment = groups.pop("comment")
+    classes = {_CLASSES.get(name, name): f"(?:{pattern})" for name, pattern in groups.items()}
+    gap = rf"[\s\x1a\xa0\ufeff]*(?:{comment}[\s\x1a\xa0\ufeff]*)*"
+    return Lexicon(
+        re.compile(_without_groups(token.pattern, "comment"), token.flags),
+        gap,
+        classes,
+        f"(?:{groups['name']})",
+        token.flags,
+    )
+
+
+def _without_groups(pattern: str, kept: str = " ") -> str:
+    return re.sub(rf"\(\?P<(?!{kept}>)\w+>", "(?:", pattern)
+
+
+def _group(pattern: str, name: str) -> str:
+    """Text of a named group of a verbose pattern."""
+    start = pattern.index(f"(?P<{name}>") + len(f"(?P<{name}>")
+    depth, position, in_set = 1, start, False
+    while depth:
+        character = pattern[position]
+        if character == "\\":
+            position += 1
+        elif in_set:
+            in_set = character != "]"
+        elif character == "[":
+            in_set = True
+        else:
+            depth += {"(": 1, ")": -1}.get(character, 0)
+        position += 1
+    return pattern[start : position - 1]

@@ -1,26 +1,31 @@
 """Statements as they stand in a file: spans of the text and, on demand, a tree over them.
 
 Thousands of statements of a program differ only in numbers, names and strings. They share one `Shape`, which holds the
-tree once with token positions in place of text; a `Node` is that tree laid over one statement's own tokens.
+tree once with token positions in place of text; a `Node` is that tree laid over one statement's own tokens. A shape also
+makes one pattern from its tokens, so that a single match finds the place of every token, or of every number, at once.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import cached_property
+from operator import itemgetter
+from typing import Any, NamedTuple
 
 from respot.source import Span
 
 #: Kind of a statement that no rule of the grammar knows.
 OPAQUE = "opaque"
+#: A statement of more tokens is searched token by token: its pattern would cost more than it saves.
+_MOST_GROUPS = 500
 
 
 class Leaf(NamedTuple):
     """A token of a tree: its position among the statement's tokens and its terminal's name."""
 
-    index: int
+    position: int
     type: str
 
 
@@ -33,7 +38,74 @@ class Branch(NamedTuple):
     last: int
 
 
+class Numbers(NamedTuple):
+    """Every number literal of a statement, in the order of the text, with the sign that stands before it.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Name of the member it is the value of, in upper case, within nested aggregates with dots: ``CM.X``; empty for a
+        number that is no member's value.
+    texts : tuple of str
+        As written; blanks may stand after a sign.
+    spans : tuple of Span
+        Places in the file.
+    """
+
+    names: tuple[str, ...]
+    texts: tuple[str, ...]
+    spans: tuple[Span, ...]
+
+    @property
+    def values(self) -> list[float]:
+        """The numbers themselves."""
+        try:
+            return list(map(float, self.texts))
+        except ValueError:
+            return [number(text) for text in self.texts]
+
+
+def number(text: str) -> float:
+    """Value of a number as programs write it: blanks after the sign, or a base as in ``0x1F``."""
+    text = "".join(text.split()).replace("\x1a", "")
+    try:
+        return float(text)
+    except ValueError:
+        return float(int(text, 0))
+
+
 @dataclass(frozen=True)
+class Lexicon:
+    """How the tokens of a language look.
+
+    Parameters
+    ----------
+    token : re.Pattern
+        Finds every token; group 1 is a comment and the only group that is ever set.
+    gap : str
+        Pattern of what may stand between two tokens of a statement.
+    classes : mapping of str to str
+        Kind of a token, such as ``0`` for a number, and the pattern of its tokens.
+    words : str
+        Pattern of a token whose kind is a word.
+    flags : int
+        Flags of all these patterns.
+    """
+
+    token: re.Pattern[str]
+    gap: str
+    classes: dict[str, str]
+    words: str
+    flags: int
+
+    def pattern_of(self, kind: str) -> str:
+        """Pattern of the tokens of a kind."""
+        found = self.classes.get(kind)
+        if found is not None:
+            return found
+        return self.words if kind[0].isalpha() or kind[0] in "_$" else re.escape(kind)
+
+
 class Shape:
     """What all statements of one shape share.
 
@@ -42,17 +114,149 @@ class Shape:
     kind : str
         Rule of the grammar, or `OPAQUE`.
     tree : Branch or None
-        None for an opaque statement.
+        None for an opaque statement and for a line without a tree, such as a comment.
     reason : str
         Why the statement is opaque.
-    token : re.Pattern
-        Token pattern of the language; group 1 is a comment.
+    lexicon : Lexicon
+        Tokens of the language.
+    kinds : tuple of str
+        Kinds of the tokens; empty where they are not known.
+    fault : int or None
+        Position of the token that the grammar does not expect; None if it is the end that comes too early.
     """
 
-    kind: str
-    tree: Branch | None
-    reason: str
-    token: re.Pattern[str]
+    def __init__(
+        self,
+        kind: str,
+        tree: Branch | None,
+        reason: str,
+        lexicon: Lexicon,
+        kinds: tuple[str, ...] = (),
+        fault: int | None = None,
+    ) -> None:
+        self.kind = kind
+        self.tree = tree
+        self.reason = reason
+        self.lexicon = lexicon
+        self.kinds = kinds
+        self.fault = fault
+        self._names: dict[tuple[str, ...], tuple[str, ...]] = {}
+
+    def spans(self, text: str, start: int, end: int) -> list[Span]:
+        """Spans of the tokens of a statement of this shape."""
+        if self._pattern is not None:
+            match = self._pattern.match(text, start, end)
+            if match is not None:
+                return list(match.regs[1:])
+        found = self.lexicon.token.finditer(text, start, end)
+        return [match.span() for match in found if match.lastindex is None]
+
+    def numbers(self, text: str, start: int, end: int) -> Numbers:
+        """Numbers of a statement of this shape."""
+        places = self._places
+        if not places.numbers:
+            return _NO_NUMBERS
+        match = None if self._number_pattern is None else self._number_pattern.match(text, start, end)
+        if match is None:
+            return self._numbers_by_token(text, start, end)
+        groups = match.groups()
+        return Numbers(
+            self._keys(places.pick_names(groups)), places.pick_numbers(groups), places.pick_spans(match.regs)
+        )
+
+    @cached_property
+    def _pattern(self) -> re.Pattern[str] | None:
+        """One group for each token."""
+        if not 0 < len(self.kinds) <= _MOST_GROUPS:
+            return None
+        tokens = (f"({self.lexicon.pattern_of(kind)})" for kind in self.kinds)
+        return re.compile(self.lexicon.gap.join(tokens), self.lexicon.flags)
+
+    @cached_property
+    def _places(self) -> _Places:
+        return _Places(self.tree)
+
+    @cached_property
+    def _number_pattern(self) -> re.Pattern[str] | None:
+        """One group for each number with its sign and for each name of a member."""
+        if not 0 < len(self.kinds) <= _MOST_GROUPS:
+            return None
+        tokens = [self.lexicon.pattern_of(kind) for kind in self.kinds]
+        for name in self._places.names:
+            tokens[name] = f"({tokens[name]})"
+        for _, first, last in self._places.numbers:
+            tokens[first] = f"({tokens[first]}"
+            tokens[last] = f"{tokens[last]})"
+        return re.compile(self.lexicon.gap.join(tokens), self.lexicon.flags)
+
+    def _keys(self, names: tuple[str, ...]) -> tuple[str, ...]:
+        """Names of the numbers, from the names of the members as they are written."""
+        try:
+            return self._names[names]
+        except KeyError:
+            pass
+        upper = dict(zip(self._places.names, (name.upper() for name in names), strict=True))
+        keys = tuple(".".join(upper[name] for name in path) for path, _, _ in self._places.numbers)
+        if len(self._names) < _MOST_GROUPS:
+            self._names[names] = keys
+        return keys
+
+    def _numbers_by_token(self, text: str, start: int, end: int) -> Numbers:
+        tokens = self.spans(text, start, end)
+        names = tuple(text[slice(*tokens[name])] for name in self._places.names)
+        spans = tuple((tokens[first][0], tokens[last][1]) for _, first, last in self._places.numbers)
+        return Numbers(self._keys(names), tuple(text[slice(*span)] for span in spans), spans)
+
+
+class _Places:
+    """Where the numbers of a tree are, and the names of the members they belong to."""
+
+    def __init__(self, tree: Branch | None) -> None:
+        #: For each number: the positions of its members' names, outermost first, and its first and last token.
+        self.numbers: list[tuple[tuple[int, ...], int, int]] = []
+        if tree is not None:
+            self._find(tree, ())
+        #: Positions of the names, in order.
+        self.names = sorted({name for path, _, _ in self.numbers for name in path})
+        order = sorted([*self.names, *(first for _, first, _ in self.numbers)])
+        group = {position: index for index, position in enumerate(order)}
+        numbers = [group[first] for _, first, _ in self.numbers]
+        self.pick_names: Callable[[tuple[str, ...]], tuple[str, ...]] = _picker([group[name] for name in self.names])
+        self.pick_numbers: Callable[[tuple[str, ...]], tuple[str, ...]] = _picker(numbers)
+        self.pick_spans: Callable[[tuple[Span, ...]], tuple[Span, ...]] = _picker([index + 1 for index in numbers])
+
+    def _find(self, branch: Branch, path: tuple[int, ...]) -> None:
+        if branch.kind == "number" or (branch.kind == "signed" and _is_number(branch)):
+            self.numbers.append((path, branch.first, branch.last))
+            return
+        for child in branch.children:
+            if not isinstance(child, Branch):
+                continue
+            if branch.kind == "member":
+                value = child is branch.children[-1] and child.kind in ("number", "signed", "aggregate")
+                name = branch.children[0]
+                self._find(child, (*path, name.position) if value and isinstance(name, Leaf) else ())
+            else:
+                self._find(child, path if branch.kind == "aggregate" and child.kind == "member" else ())
+
+
+def _is_number(branch: Branch) -> bool:
+    """Whether nothing but signs stands around a number."""
+    last = branch.children[-1]
+    return isinstance(last, Branch) and (last.kind == "number" or (last.kind == "signed" and _is_number(last)))
+
+
+def _picker(positions: list[int]) -> Callable[[tuple[Any, ...]], tuple[Any, ...]]:
+    """Return a function that takes the items at these positions of a tuple, at C speed."""
+    if not positions:
+        return lambda _: ()
+    step = positions[1] - positions[0] if len(positions) > 1 else 1
+    if positions == list(range(positions[0], positions[-1] + 1, step)):
+        return itemgetter(slice(positions[0], positions[-1] + 1, step))
+    return itemgetter(*positions)
+
+
+_NO_NUMBERS = Numbers((), (), ())
 
 
 class Statement:
@@ -91,8 +295,22 @@ class Statement:
 
     def tokens(self) -> list[Span]:
         """Spans of the tokens in the file; comments are left out."""
-        found = self.shape.token.finditer(self.text, self.start, self.end)
-        return [match.span() for match in found if match.lastindex is None]
+        return self.shape.spans(self.text, self.start, self.end)
+
+    def numbers(self) -> Numbers:
+        """Every number literal with its place; none for an opaque statement.
+
+        This is the quick way to the fields of a point: one match, no tree.
+        """
+        return self.shape.numbers(self.text, self.start, self.end)
+
+    @property
+    def fault(self) -> Span:
+        """Place of the token that makes the statement opaque; the whole statement where it is not known."""
+        if self.shape.fault is None:
+            return (self.start, self.end)
+        tokens = self.tokens()
+        return tokens[self.shape.fault] if self.shape.fault < len(tokens) else (self.start, self.end)
 
     @property
     def node(self) -> Node:
@@ -104,7 +322,7 @@ class Statement:
             The statement is opaque.
         """
         if self.shape.tree is None:
-            raise ValueError(f"line {self.line} is opaque: {self.shape.reason}")
+            raise ValueError(f"line {self.line} is {self.kind}: {self.shape.reason or 'it has no tree'}")
         return Node(self.text, self.tokens(), self.shape.tree)
 
     def __repr__(self) -> str:
@@ -180,7 +398,7 @@ class Node:
         return Node(self._text, self._spans, child) if isinstance(child, Branch) else self._token(child)
 
     def _token(self, leaf: Leaf) -> Token:
-        start, end = self._spans[leaf.index]
+        start, end = self._spans[leaf.position]
         return Token(leaf.type, self._text[start:end], (start, end))
 
     def __repr__(self) -> str:

@@ -7,8 +7,8 @@ A cycle is accepted only if all of these hold, judged by the least-squares fit o
 own members, so that none of them takes part in its own trial (a held-out prediction; t is 99.9 % of chi with 3 degrees
 of freedom times the robust scale, widened by each member's leverage):
 
-1. as named, every member misses its place by more than t, and by more than t would be if the noise along every axis
-   were that of the inliers' widest (along a flange spots are spaced by hand: near neighbours must not pass for exchanged);
+1. as named, every member misses its place by more than t, and by more than t would be if noise along every axis were
+   that of the inliers' widest (spots are spaced by hand along a flange: near neighbours must not pass for exchanged);
 2. with the names repaired, every member meets its place within t, or (noise is rarely the same along all axes) within
    2 t and a quarter of what it missed as named;
 3. the RMS over the members falls to `GAIN` or less of what it was;

@@ -1,8 +1,7 @@
 """Which list has the wrong names? Evidence from the naming of mirrored spots, never proof.
 
 Left and right spots of a part are mostly named in one go, so that a spot and its mirror image carry nearby numbers.
-Where the reference spots are mirror images of each other, the naming
-that gives mirror pairs nearer numbers is the likelier.
+Where reference spots are mirror images of each other, the naming that gives mirror pairs nearer numbers is likelier.
 """
 
 from __future__ import annotations

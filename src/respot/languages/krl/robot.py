@@ -18,6 +18,8 @@ from respot.source import SourceText
 
 SUFFIXES = (".src", ".dat", ".sub")
 _MOTIONS = frozenset(("motion", "relative_motion", "circular_motion"))
+#: Types of points. A FRAME becomes a target only where a motion goes to it: most are tools and bases.
+_POINTS = frozenset(("POS", "E6POS", "E3POS", "AXIS", "E6AXIS", "E3AXIS"))
 _FRAME_NAMES = ("$TOOL", "$BASE", "FDAT_ACT")
 
 
@@ -44,7 +46,8 @@ def read_robot(name: str, root: str, files: Mapping[str, bytes]) -> Robot:
     targets = Targets({path: file.source for path, file in read.items()})
     for scope in scopes:
         for symbol in scope.symbols.values():
-            targets.declared(symbol)
+            if symbol.type in _POINTS and not symbol.name.startswith("$"):
+                targets.declared(symbol)
     code = {path: blocks.routines(file.statements) for path, file in read.items() if not path.lower().endswith(".dat")}
     binder = Binder(symbols, frames, targets, _written(read), _framing(code))
     routines = [binder.routine(block, read[path].program, path) for path, found in code.items() for block in found]

@@ -75,9 +75,9 @@ class Scope:
     def add(self, symbol: Symbol) -> None:
         """Add a symbol; an assignment gives a value to its declaration."""
         key = symbol.name.upper()
-        declared = self.symbols.get(key)
+        declared = self.symbols.get(key) or self.symbols.get(key.partition("[")[0])
         if declared is not None and not symbol.type:
-            symbol = Symbol(declared.name, declared.type, symbol.value, symbol.path, symbol.line, declared.visible)
+            symbol = Symbol(symbol.name, declared.type, symbol.value, symbol.path, symbol.line, declared.visible)
         self.symbols[key] = symbol
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
+from itertools import count
 
-from respot.languages.shapes import LONGEST_STATEMENT, Shapes
-from respot.program.statement import Statement
+from respot.languages.shapes import LONGEST_STATEMENT, Cache, Shapes
+from respot.program.statement import Shape, Statement
 from respot.source import Span
 
 ENCODINGS = ("cp1252", "latin-1")
@@ -16,11 +17,11 @@ TOKEN = re.compile(
     | (?P<name>[A-Za-z_$][A-Za-z0-9_$]*)
     | (?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)
     | (?P<string>"[^"\r\n]*")
-    | '[BbHhDd]?[0-9A-Fa-f]+'
-    | &[^\r\n]*
-    | /[\w$/]+\.\.[\w$]+
+    | (?P<bits>'[BbHhDd]?[0-9A-Fa-f]+')
+    | (?P<header>&[^\r\n]*)
+    | (?P<path>/[\w$/]+\.\.[\w$]+)
     | == | <> | <= | >=
-    | [^\s\x1a]
+    | [^\ \t\f\r\n\x1a\xa0]
     """,
     re.VERBOSE,
 )
@@ -41,6 +42,11 @@ _TOO_LONG = SHAPES.opaque(f"longer than {LONGEST_STATEMENT // 1024} kB")
 #: Kinds that count as no statement (INTERFACES, `check`).
 NO_STATEMENT = frozenset(_PLAIN)
 
+#: A line's shape and the blanks before and after it, its end among these; None for a blank line.
+_Line = tuple[Shape, int, int] | None
+_BLANK_OR_END = _BLANK + "\r\n"
+_LINES: Cache[_Line] = Cache()
+
 
 def read_statements(text: str, line_starts: list[int]) -> list[Statement]:
     """Statements, comments and fold marks of a file, in order.
@@ -53,28 +59,38 @@ def read_statements(text: str, line_starts: list[int]) -> list[Statement]:
         `SourceText.line_starts`.
     """
     statements: list[Statement] = []
+    add = statements.append
+    known = _LINES
     ends = [*line_starts[1:], len(text)]
-    unit = SHAPES.unit
-    for number, (start, end) in enumerate(zip(line_starts, ends, strict=True), 1):
-        raw = text[start:end]
-        line = raw.lstrip(_BLANK)
-        start += len(raw) - len(line)
-        line = line.rstrip("\r\n \t\f\x1a\xa0")
-        if not line:
-            continue
-        if line[0] == ";":
-            mark = _FOLD_MARK.match(line)
-            kind = COMMENT if mark is None else FOLD if mark.group(1) else END_FOLD
-            shape = _PLAIN[kind]
-        elif len(line) > LONGEST_STATEMENT:
-            shape = _TOO_LONG
-        else:
-            parts = unit(line)
-            if not parts:
-                continue
-            shape = parts[0].shape
-        statements.append(Statement(text, start, start + len(line), number, shape))
+    for number, start, end, key in zip(count(1), line_starts, ends, SHAPES.keys(text), strict=False):
+        try:
+            line = known[key]
+        except KeyError:
+            line = _read_line(text[start:end], key)
+        if line is not None:
+            add(Statement(text, start + line[1], end - line[2], number, line[0]))
     return statements
+
+
+def _read_line(raw: str, key: str) -> _Line:
+    text = raw.strip(_BLANK_OR_END)
+    if not text:
+        known: _Line = None
+    else:
+        before = len(raw) - len(raw.lstrip(_BLANK_OR_END))
+        known = (_shape(text), before, len(raw) - before - len(text))
+    _LINES.keep(key, known)
+    return known
+
+
+def _shape(text: str) -> Shape:
+    if text[0] == ";":
+        mark = _FOLD_MARK.match(text)
+        return _PLAIN[COMMENT if mark is None else FOLD if mark.group(1) else END_FOLD]
+    if len(text) > LONGEST_STATEMENT:
+        return _TOO_LONG
+    parts = SHAPES.read(text)
+    return parts[0].shape if parts else _PLAIN[COMMENT]
 
 
 _FIRST_WORD = re.compile(r"(?:GLOBAL\s+)?(?:DEF|DEFFCT|DEFDAT)\b", re.IGNORECASE)

@@ -32,7 +32,7 @@ class Targets:
         """Target of a declared point or array element; None if it is no literal position."""
         if not isinstance(symbol.value, Aggregate):
             return None
-        if symbol.type and symbol.type not in POSITION_TYPES:
+        if symbol.type not in POSITION_TYPES:
             return None
         return self.literal(symbol.name, symbol.path, symbol.value, declared=True)
 

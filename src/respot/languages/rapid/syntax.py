@@ -1,11 +1,17 @@
-"""Statements of RAPID: they end with ``;`` or a block word, and may share or span lines."""
+"""Statements of RAPID: they end with ``;`` or a block word, and may share or span lines.
+
+A line is looked up first as it stands: nearly all hold whole statements. One that does not is joined with the lines
+below it until its end is found. The end may be missing, so every line below is first asked whether it can only begin a
+statement of its own; then what was joined so far is read as it is, and one broken line costs one statement.
+"""
 
 from __future__ import annotations
 
 import re
+from bisect import bisect_right
 
-from respot.languages.shapes import LONGEST_STATEMENT, Shapes
-from respot.program.statement import Statement
+from respot.languages.shapes import LONGEST_STATEMENT, Cache, Part, Shapes, Unit
+from respot.program.statement import OPAQUE, Shape, Statement
 from respot.source import Span
 
 ENCODINGS = ("latin-1",)
@@ -25,31 +31,35 @@ TOKEN = re.compile(
 )
 
 COMMENT, AFTER_MODULE = "comment", "after_module"
+#: Kinds that count as no statement (INTERFACES, `check`).
+NO_STATEMENT = frozenset((COMMENT, AFTER_MODULE))
 
-#: Block words that are whole statements.
-_WORDS = frozenset(
-    [
-        "ENDMODULE",
-        "ENDPROC",
-        "ENDFUNC",
-        "ENDTRAP",
-        "ENDRECORD",
-        "ENDIF",
-        "ENDFOR",
-        "ENDWHILE",
-        "ENDTEST",
-        "ELSE",
-        "UNDO",
-        "BACKWARD",
-        "<SMT>",
-        "<DDN>",
-        "<TDN>",
-        "<RDN>",
-    ]
+
+def _words(words: str) -> frozenset[str]:
+    return frozenset(words.split())
+
+
+#: Words that are whole statements.
+_WHOLE = _words(
+    "ENDMODULE ENDPROC ENDFUNC ENDTRAP ENDRECORD ENDIF ENDFOR ENDWHILE ENDTEST ELSE UNDO BACKWARD"
+    " <TDN> <DDN> <RDN> <SMT> <EIT> <CSE>"
 )
-_ENDS_WITH = {"ELSEIF": "THEN", "FOR": "DO", "WHILE": "DO", "CASE": ":", "DEFAULT": ":"}
-_MODIFIERS = frozenset(("LOCAL", "TASK"))
-_TEST_ENDS = frozenset(("CASE", "DEFAULT", "ENDTEST", "<CSE>"))
+#: Statements that end with a word of their own.
+_ENDS_WITH = {"IF": "THEN", "ELSEIF": "THEN", "FOR": "DO", "WHILE": "DO", "CASE": ":", "DEFAULT": ":"}
+_MODIFIERS = _words("LOCAL TASK")
+_STORAGE = _words("VAR PERS CONST")
+_HEADS = _words("PROC FUNC")
+#: Words that begin a simple statement; a compact IF may stand before them.
+_JUMPS = _words("RETURN GOTO RAISE EXIT RETRY TRYNEXT CONNECT")
+#: Words that stand nowhere but at the beginning of a statement.
+_FIRST = (
+    _WHOLE
+    | _JUMPS
+    | _words("MODULE PROC FUNC TRAP RECORD ALIAS IF ELSEIF FOR WHILE TEST CASE DEFAULT ERROR CONST LOCAL TASK")
+)
+_FIRST_IN_SIMPLE = _FIRST | _STORAGE
+#: Reserved words within a statement: the next line goes on with it.
+_WITHIN = _words("AND OR XOR NOT DIV MOD THEN DO FROM TO STEP WITH INOUT")
 _OPEN, _CLOSE = "([{", ")]}"
 
 
@@ -66,74 +76,144 @@ def _split(kinds: list[str]) -> list[Span] | None:
     return ranges
 
 
+def _split_last(kinds: list[str]) -> list[Span]:
+    """Token ranges of the statements where no line belongs to the last one any more."""
+    ranges: list[Span] = []
+    first = 0
+    while first < len(kinds):
+        last = _end(kinds, first)
+        if last is None:
+            last = len(kinds) - 1
+        ranges.append((first, last))
+        first = last + 1
+    return ranges
+
+
 def _end(kinds: list[str], first: int) -> int | None:
-    word = kinds[first]
-    if word in _MODIFIERS and first + 1 < len(kinds) and kinds[first + 1] in ("PROC", "FUNC", "TRAP", "RECORD"):
-        first += 1
-        word = kinds[first]
-    following = kinds[first + 1] if first + 1 < len(kinds) else ""
-    if word in _WORDS or word.startswith("%%%"):
-        return first
+    """Index of the last token of a statement; it ends before a word that can only begin the next one."""
+    at = first
+    while at < len(kinds) - 1 and kinds[at] in _MODIFIERS:
+        at += 1
+    word = kinds[at]
+    following = kinds[at + 1] if at + 1 < len(kinds) else ""
+    if word in _WHOLE or word == ";" or word.startswith("%%%"):
+        return at
     if word == "ERROR":
-        return _closing(kinds, first + 1) if following == "(" else first
-    if word in ("PROC", "FUNC"):
-        return _routine_head(kinds, first, 2 if word == "PROC" else 3)
+        return _closing(kinds, at + 1) if following == "(" else at
+    if word in _HEADS:
+        return _routine_head(kinds, at, 2 if word == "PROC" else 3)
     if word == "MODULE":
-        if len(kinds) > first + 2 and kinds[first + 2] == "(":
-            return _closing(kinds, first + 2)
-        return first + 1 if following else None
+        if len(kinds) > at + 2 and kinds[at + 2] == "(":
+            return _closing(kinds, at + 2)
+        return _name_after(kinds, at)
     if word in ("TRAP", "RECORD"):
-        return first + 1 if following else None
-    if word == "IF":
-        return _find(kinds, first, ("THEN", ";"))
-    if word == "TEST":
-        end = next((index for index in range(first, len(kinds)) if kinds[index] in _TEST_ENDS), None)
-        return None if end is None else end - 1
-    if word in _ENDS_WITH:
-        return _find(kinds, first, (_ENDS_WITH[word],))
-    if following == ":" and word not in ("<EXP>",):
-        return first + 1
-    return _find(kinds, first, (";",))
-
-
-def _routine_head(kinds: list[str], first: int, opening: int) -> int | None:
-    if len(kinds) <= first + opening:
-        return None
-    if kinds[first + opening] != "(":
-        return first + opening - 1
-    return _closing(kinds, first + opening)
-
-
-def _find(kinds: list[str], first: int, ends: tuple[str, ...]) -> int | None:
-    return next((index for index in range(first, len(kinds)) if kinds[index] in ends), None)
-
-
-def _closing(kinds: list[str], opening: int) -> int | None:
-    depth = 0
-    for index in range(opening, len(kinds)):
-        if kinds[index] in _OPEN:
-            depth += 1
-        elif kinds[index] in _CLOSE:
-            depth -= 1
-            if depth == 0:
-                return index
+        return _name_after(kinds, at)
+    if following == ":" and word not in _FIRST_IN_SIMPLE:
+        return at + 1
+    own = _ENDS_WITH.get(word, ";")
+    stops = _FIRST_IN_SIMPLE - _JUMPS if word == "IF" else _FIRST_IN_SIMPLE
+    for index in range(at + 1, len(kinds)):
+        kind = kinds[index]
+        if kind == ";" or kind == own:
+            return index
+        if kind in stops:
+            return index - 1
     return None
 
 
-SHAPES = Shapes("rapid", "piece", TOKEN, _split)
+def _name_after(kinds: list[str], at: int) -> int | None:
+    if at + 1 == len(kinds):
+        return None
+    return at if kinds[at + 1] in _FIRST_IN_SIMPLE else at + 1
+
+
+def _routine_head(kinds: list[str], at: int, opening: int) -> int | None:
+    for index in range(at + 1, min(at + opening, len(kinds))):
+        if kinds[index] in _FIRST_IN_SIMPLE or kinds[index] == ";":
+            return index - 1
+    if len(kinds) <= at + opening:
+        return None
+    if kinds[at + opening] != "(":
+        return at + opening - 1
+    return _closing(kinds, at + opening)
+
+
+def _closing(kinds: list[str], opening: int) -> int | None:
+    """Index of the bracket that closes another; before it is found a head ends at ``;`` or at the next statement."""
+    depth = 0
+    for index in range(opening, len(kinds)):
+        kind = kinds[index]
+        if kind in _OPEN:
+            depth += 1
+        elif kind in _CLOSE:
+            depth -= 1
+            if depth == 0:
+                return index
+        elif kind == ";":
+            return index
+        elif kind in _FIRST:
+            return index - 1
+    return None
+
+
+class RapidShapes(Shapes):
+    """The shapes of RAPID, which has statements that no end word closes."""
+
+    def last(self, text: str) -> tuple[Part, ...]:
+        """Statements of a run of lines that ends with the statement it began, whole or not."""
+        kinds, _ = self.kinds(text)
+        ranges = _split_last(kinds)
+        return tuple(Part(first, last, self._shape(text, kinds, first, last)) for first, last in ranges)
+
+
+SHAPES = RapidShapes("rapid", "piece", TOKEN, _split)
 _COMMENT = SHAPES.plain(COMMENT)
 _AFTER_MODULE = SHAPES.plain(AFTER_MODULE)
 _TOO_LONG = SHAPES.opaque(f"longer than {LONGEST_STATEMENT // 1024} kB")
-_UNFINISHED = SHAPES.opaque("ends too early")
+#: Lines that are one statement each, by their keys: the shape, and the lengths of what stands before and after it.
+_LINES: Cache[tuple[Shape, int, int]] = Cache()
 
-#: Kinds that count as no statement (INTERFACES, `check`).
-NO_STATEMENT = frozenset((COMMENT, AFTER_MODULE))
-
-_BLANK = " \t\f\x1a\xa0"
+_BLANK = "".join(filter(str.isspace, map(chr, range(0x3001)))) + "\x1a\ufeff"
+_HEADER = re.compile(r"%%%[^%]*%%%")
+_MODULE = re.compile(r"%%%|MODULE\s+[^\W\d]\w*\s*(?:[(!]|\Z)", re.IGNORECASE)
+_WORD = re.compile(r"[^\W\d]\w*|<(?:TDN|DDN|RDN|PAR|ALT|DIM|SMT|VAR|EIT|CSE|EXP|ARG|ID)>|%", re.IGNORECASE)
+#: What can hold the end of a statement; cheaper than the tokens of the line.
 _MAY_END = re.compile(
-    r";|:(?!=)|\)|%%%|\b(?:THEN|DO|ELSE|ERROR|UNDO|BACKWARD|CASE|DEFAULT|END\w+|MODULE|TRAP|RECORD)\b|<\w+>",
+    r"[;:)]|\b(?:THEN|DO|END\w+|"
+    + "|".join(word for word in sorted(_FIRST_IN_SIMPLE) if word[0] != "<")
+    + r")\b|<\w+>",
     re.IGNORECASE,
 )
+#: Ends of a statement in a text too long for tokens: strings and comments are skipped.
+_SEMICOLON = re.compile(r'"[^"\r\n]*"|![^\r\n]*|;')
+#: A line that begins a statement whatever stands before it: no expression holds two operands in a row.
+_TWO_OPERANDS = re.compile(
+    r"""[^\W\d]\w*(?:\s+(?!(?:AND|OR|XOR|DIV|MOD|THEN|DO|FROM|TO|STEP|WITH)\b)[^\W\d]|\s+[0-9.]|\s*["\[])""",
+    re.IGNORECASE,
+)
+_ASSIGNS = re.compile(r"[^\W\d]\w*(?:\s*\{[^}]*\}|\s*\.\s*[^\W\d]\w*)*\s*:=", re.IGNORECASE)
+#: Tries at closing one head; more are only met in a file made to stall the reader.
+_MOST_TRIES = 50
+
+
+class _Begun:
+    """A statement that goes on in the next line."""
+
+    __slots__ = ("comments", "joined", "last", "line", "start", "stop", "tries", "words")
+
+    def __init__(self, start: int, stop: int, line: int, words: tuple[str, ...]) -> None:
+        self.start = start
+        self.line = line
+        #: begin and end of its last line with code
+        self.last = start
+        self.stop = stop
+        #: its first words in upper case, modifiers left out
+        self.words = words
+        #: a compact IF has taken its statement
+        self.joined = False
+        self.tries = 0
+        #: comment lines since its last line with code
+        self.comments: list[Statement] = []
 
 
 def read_statements(text: str, line_starts: list[int]) -> list[Statement]:
@@ -146,57 +226,232 @@ def read_statements(text: str, line_starts: list[int]) -> list[Statement]:
     line_starts : list of int
         `SourceText.line_starts`.
     """
-    statements: list[Statement] = []
-    ends = [*line_starts[1:], len(text)]
-    begun: tuple[int, int] | None = None  # offset and line of a statement that goes on
-    finished = False
-    for number, (start, end) in enumerate(zip(line_starts, ends, strict=True), 1):
-        raw = text[start:end]
-        line = raw.lstrip(_BLANK)
-        start += len(raw) - len(line)
-        line = line.rstrip("\r\n \t\f\x1a\xa0")
-        if not line:
-            continue
+    return _Reader(text, line_starts).read()
+
+
+class _Reader:
+    """Reads one file, line by line."""
+
+    def __init__(self, text: str, line_starts: list[int]) -> None:
+        self._text = text
+        self._line_starts = line_starts
+        self._statements: list[Statement] = []
+        self._begun: _Begun | None = None
+        #: ENDMODULE was read
+        self._finished = False
+        #: end of the file header, which spans lines
+        self._header_end = 0
+
+    def read(self) -> list[Statement]:
+        """Read all lines."""
+        text, add, known = self._text, self._statements.append, _LINES
+        ends = [*self._line_starts[1:], len(text)]
+        number = 0
+        for start, end, key in zip(self._line_starts, ends, SHAPES.keys(text), strict=False):
+            number += 1
+            if self._begun is None and not self._finished:
+                try:
+                    shape, before, after = known[key]
+                except KeyError:
+                    pass
+                else:
+                    add(Statement(text, start + before, end - after, number, shape))
+                    self._finished = shape.kind == "end_module"
+                    continue
+            self._take(start, end, number, key)
+        self._cut()
+        return self._statements
+
+    def _take(self, start: int, end: int, number: int, key: str) -> None:
+        """Take a line that is not known as one statement that stands alone."""
+        raw = self._text[start:end]
+        line = raw.strip(_BLANK)
+        if not line or start < self._header_end:
+            return
+        before = len(raw) - len(raw.lstrip(_BLANK))
+        start += before
         stop = start + len(line)
-        if finished:
-            statements.append(Statement(text, start, stop, number, _AFTER_MODULE))
-            continue
         if line[0] == "!":
-            if begun is None:
-                statements.append(Statement(text, start, stop, number, _COMMENT))
-            continue
+            self._comment(start, stop, number)
+        elif self._begun is None and not self._finished and len(line) <= LONGEST_STATEMENT and line[0] not in "%(":
+            parts = SHAPES.read(line)
+            if parts is not None and len(parts) == 1:
+                _LINES.keep(key, (parts[0].shape, before, end - stop))
+                self._append(start, stop, parts[0].shape)
+            else:
+                self._join(line, start, stop, number, parts)
+        else:
+            self._join(line, start, stop, number, None)
+
+    def _comment(self, start: int, stop: int, number: int) -> None:
+        shape = _AFTER_MODULE if self._finished else _COMMENT
+        comments = self._statements if self._begun is None else self._begun.comments
+        comments.append(Statement(self._text, start, stop, number, shape))
+
+    def _join(self, line: str, start: int, stop: int, number: int, parts: Unit) -> None:
+        """Take a line that goes on with another, lets another go on with it, or holds several statements."""
+        if self._finished:
+            if not _MODULE.match(line):
+                self._statements.append(Statement(self._text, start, stop, number, _AFTER_MODULE))
+                return
+            self._finished = False
+        if self._begun is not None:
+            if not self._begins(self._begun, line, start):
+                self._go_on(self._begun, line, start, stop)
+                return
+            self._cut()
+        if line.startswith("%%%") and self._header(start, number):
+            return
+        if line[0] == "(" and self._statements and self._statements[-1].kind in ("module", "error"):
+            head = self._statements.pop()
+            start, number = head.start, head.line
+            line = self._text[start:stop]
+            parts = None
+        if parts is None and len(line) <= LONGEST_STATEMENT:
+            parts = SHAPES.read(line)
+        if parts is not None:
+            self._add(parts, start, stop)
+            return
+        self._begun = _Begun(start, stop, number, _first_words(line))
+        if len(line) > LONGEST_STATEMENT and _has_semicolon(line):
+            self._add_long(self._begun)
+
+    def _header(self, start: int, number: int) -> bool:
+        header = _HEADER.match(self._text, start)
+        if header is None:
+            return False
+        end = self._line_end(header.end())
+        self._begun = _Begun(start, end, number, ())
+        self._header_end = end
+        self._cut()
+        return True
+
+    def _line_end(self, offset: int) -> int:
+        index = bisect_right(self._line_starts, offset)
+        end = self._line_starts[index] if index < len(self._line_starts) else len(self._text)
+        return offset + len(self._text[offset:end].rstrip(_BLANK))
+
+    def _go_on(self, begun: _Begun, line: str, start: int, stop: int) -> None:
+        """Take a line that goes on with a statement; end it if its end stands there."""
+        begun.last, begun.stop = start, stop
+        begun.comments.clear()
+        if stop - begun.start > LONGEST_STATEMENT:
+            if _has_semicolon(line):
+                self._add_long(begun)
+            return
+        if not _MAY_END.search(line) or not _holds_end(begun, SHAPES.kinds(line)[0]):
+            return
+        begun.tries += 1
+        parts = SHAPES.read(self._text[begun.start : stop])
+        if parts is not None:
+            self._begun = None
+            self._add(parts, begun.start, stop)
+        elif begun.tries > _MOST_TRIES:
+            self._cut()
+
+    def _begins(self, begun: _Begun, line: str, start: int) -> bool:
+        """Whether a line begins a statement although the one before it has not ended."""
+        found = _WORD.match(line)
+        if found is None:
+            return False
+        word = found.group().upper()
+        compact = begun.words[:1] == ("IF",) and not begun.joined
+        if word in _WITHIN or not begun.words:
+            return False
+        if word in _FIRST_IN_SIMPLE:
+            if word in _STORAGE and begun.words[0] in _HEADS:
+                return _is_operand(self._last_kind(begun))
+            if compact and word in _JUMPS:
+                begun.joined = True
+                return False
+            return True
+        before = self._last_kind(begun)
+        if not _is_operand(before):
+            if compact or begun.words[0] in _HEADS:
+                return False
+            if _TWO_OPERANDS.match(line):
+                return True
+            return before not in (",", "\\") and _ASSIGNS.match(line) is not None
+        if compact:
+            begun.joined = True
+            return False
+        if len(begun.words) == 1 and begun.last == begun.start:
+            # a procedure without arguments and no `;`, or one whose arguments stand in the next line: further right
+            return self._column(start) <= self._column(begun.start)
+        return not (begun.words[0] in _STORAGE and len(begun.words) == 2)
+
+    def _last_kind(self, begun: _Begun) -> str:
+        begin = max(begun.last, begun.stop - LONGEST_STATEMENT)
+        return SHAPES.kinds(self._text[begin : begun.stop])[0][-1]
+
+    def _column(self, start: int) -> int:
+        return start - self._line_starts[bisect_right(self._line_starts, start) - 1]
+
+    def _cut(self) -> None:
+        """End the statement that was begun, whole or not."""
+        begun, self._begun = self._begun, None
         if begun is None:
-            begun = (start, number)
-        elif not _MAY_END.search(line):
-            continue
-        if stop - begun[0] > LONGEST_STATEMENT:
-            if ";" not in line:
-                continue
-            statements.append(Statement(text, begun[0], stop, begun[1], _TOO_LONG))
-            begun = None
-            continue
-        read = _unit(text, begun[0], stop, begun[1])
-        if read is None:
-            continue
-        statements += read
-        begun = None
-        finished = bool(read) and read[-1].kind == "end_module"
-    if begun is not None:
-        statements.append(Statement(text, begun[0], len(text.rstrip()), begun[1], _UNFINISHED))
-    return statements
+            return
+        if begun.stop - begun.start > LONGEST_STATEMENT:
+            self._statements.append(Statement(self._text, begun.start, begun.stop, begun.line, _TOO_LONG))
+        else:
+            self._add(SHAPES.last(self._text[begun.start : begun.stop]), begun.start, begun.stop)
+        self._statements += begun.comments
+
+    def _add(self, parts: tuple[Part, ...], start: int, stop: int) -> None:
+        if len(parts) == 1:
+            self._append(start, stop, parts[0].shape)
+            return
+        _, spans = SHAPES.kinds(self._text[start:stop])
+        for part in parts:
+            self._append(start + spans[part.first][0], start + spans[part.last][1], part.shape)
+
+    def _add_long(self, begun: _Begun) -> None:
+        self._begun = None
+        self._append(begun.start, begun.stop, _TOO_LONG)
+
+    def _append(self, start: int, stop: int, shape: Shape) -> None:
+        line = bisect_right(self._line_starts, start)
+        if shape.kind == OPAQUE and self._statements and self._statements[-1].line == line:
+            # what is left of a broken line is no statement of its own
+            before = self._statements[-1]
+            if before.kind == OPAQUE:
+                start, shape = before.start, SHAPES.opaque(before.shape.reason)
+                self._statements.pop()
+        self._statements.append(Statement(self._text, start, stop, line, shape))
+        self._finished = shape.kind == "end_module"
 
 
-def _unit(text: str, start: int, stop: int, line: int) -> list[Statement] | None:
-    piece = text[start:stop]
-    parts = SHAPES.unit(piece)
-    if parts is None:
-        return None
-    if len(parts) == 1:
-        return [Statement(text, start, stop, line, parts[0].shape)]
-    _, spans = SHAPES.kinds(piece)
-    statements = []
-    for part in parts:
-        begin, end = spans[part.first][0], spans[part.last][1]
-        above = piece.count("\n", 0, begin)
-        statements.append(Statement(text, start + begin, start + end, line + above, part.shape))
-    return statements
+def _first_words(line: str) -> tuple[str, ...]:
+    """Up to three tokens that begin a line, in upper case, modifiers left out."""
+    words: list[str] = []
+    for match in TOKEN.finditer(line, 0, LONGEST_STATEMENT):
+        word = match.group().upper()
+        if match.lastgroup != "comment" and (words or word not in _MODIFIERS):
+            words.append(word)
+            if len(words) == 3:
+                break
+    return tuple(words)
+
+
+def _is_operand(kind: str) -> bool:
+    """Whether an expression can end with a token; a name of the author is ``a``."""
+    if kind[0].isalpha():
+        return kind not in _FIRST_IN_SIMPLE and kind not in _WITHIN
+    return kind in ("0", '"', ")", "]", "}") or (kind[0] == "<" and len(kind) > 2)
+
+
+def _holds_end(begun: _Begun, kinds: list[str]) -> bool:
+    """Whether a line that goes on with a statement can hold its end."""
+    word = begun.words[0] if begun.words else ""
+    if ";" in kinds or _ENDS_WITH.get(word) in kinds or (kinds[0] == ":" and len(begun.words) == 1):
+        return True
+    if word in _HEADS or word in ("MODULE", "ERROR"):
+        return ")" in kinds
+    if word in ("TRAP", "RECORD"):
+        return True
+    return not _FIRST_IN_SIMPLE.isdisjoint(kinds)
+
+
+def _has_semicolon(text: str) -> bool:
+    return any(match.group() == ";" for match in _SEMICOLON.finditer(text))

@@ -1,0 +1,1 @@
+"""A calibration becomes edits on a backup."""

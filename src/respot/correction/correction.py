@@ -1,0 +1,354 @@
+"""A calibration, a robot and its matched spots become edits, file by file; what cannot be corrected refuses its program."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from scipy.spatial import Delaunay, QhullError
+from scipy.spatial.transform import RigidTransform
+
+from respot import __version__
+from respot.correction.options import CorrectionOptions
+from respot.correction.points import PointEdit, moves_at_all, new_offset, new_pose, offset_edit, point_edit
+from respot.correction.scope import Moving, Refusal, Scope, Stay, find_scope
+from respot.geometry import Array, distance_mm, turn_deg
+from respot.issues import BadInputError, Issue
+from respot.languages import LANGUAGES, Language
+from respot.languages.writing import Header, applied_calibrations, templates
+from respot.program.moves import Move
+from respot.program.robot import Robot
+from respot.source import Edit, splice
+
+
+@dataclass(frozen=True)
+class Configured:
+    """What becomes of a moved target's status and turn or confdata.
+
+    Parameters
+    ----------
+    values : mapping of str to float
+        New values by field; empty where nothing changes.
+    refusal : str
+        Why the new pose has no configuration; empty where it has one.
+    """
+
+    values: Mapping[str, float] = field(default_factory=dict)
+    refusal: str = ""
+
+
+class Configurator(Protocol):
+    """Computes configurations anew; made from the robot's kinematic model."""
+
+    def configure(self, moving: Sequence[Moving], after: Sequence[RigidTransform]) -> Sequence[Configured]:
+        """Configuration of each target for its new pose in its base."""
+
+
+@dataclass(frozen=True)
+class Transition:
+    """A motion from a moved to an unmoved target or back: its path changes, nobody checked it."""
+
+    start: str
+    end: str
+    program: str
+    path: str
+    line: int
+
+
+@dataclass(frozen=True, eq=False)
+class Correction:
+    """What a correction changes.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    language : Language
+        Its language.
+    direction : str
+        ``align`` or ``compensate``.
+    calibration_hash : str
+        Hash of the calibration.
+    scope : Scope
+        What moves and what stays.
+    edits : sequence of PointEdit
+        Changed literals.
+    refused : sequence of Refusal
+        What cannot be corrected.
+    refused_programs : frozenset of str
+        Programs that stay as they were.
+    transitions : sequence of Transition
+        Motions between moved and unmoved targets.
+    files : mapping of str to bytes
+        The changed files.
+    issues : sequence of Issue
+        What a person should know.
+    """
+
+    robot: Robot
+    language: Language
+    direction: str
+    calibration_hash: str
+    scope: Scope
+    edits: Sequence[PointEdit]
+    refused: Sequence[Refusal]
+    refused_programs: frozenset[str]
+    transitions: Sequence[Transition]
+    files: Mapping[str, bytes]
+    issues: Sequence[Issue]
+
+    @property
+    def stays(self) -> Sequence[Stay]:
+        """Targets that stay."""
+        return self.scope.stays
+
+
+def align(
+    robot: Robot,
+    source2reference: RigidTransform,
+    calibration_hash: str,
+    spot_moves: Sequence[Move],
+    options: CorrectionOptions,
+    configurator: Configurator | None,
+) -> Correction:
+    """Write programs whose targets are the model's image of the old ones.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    source2reference : RigidTransform
+        The model.
+    calibration_hash : str
+        What tells this calibration from others.
+    spot_moves : sequence of Move
+        Motions of the matched spots that the model was fitted to.
+    options : CorrectionOptions
+        What a person decided.
+    configurator : Configurator or None
+        None where no kinematic model is known.
+
+    Raises
+    ------
+    BadInputError
+        ``ALREADY_APPLIED`` if a file's header names this calibration.
+    """
+    language = LANGUAGES[robot.language]
+    _refuse_twice(robot, calibration_hash)
+    scope = find_scope(robot, language, spot_moves, options.programs)
+    after = {id(moving): new_pose(moving, source2reference) for moving in scope.moving}
+    moving = [item for item in scope.moving if _moves(item, after[id(item)])]
+    refused = [*scope.refusals, *_too_far(moving, after, options)]
+    configured = _configure(moving, after, language, options, configurator, refused)
+    refused_programs = _refused_programs(scope, refused) if not options.partial else frozenset[str]()
+    kept = _Kept(refused, refused_programs, options.partial)
+    edits = _edits(robot, language, options, kept, moving, after, configured, scope, source2reference)
+    header = _Header("align", "theory", calibration_hash)
+    return Correction(
+        robot=robot,
+        language=language,
+        direction="align",
+        calibration_hash=calibration_hash,
+        scope=scope,
+        edits=edits,
+        refused=refused,
+        refused_programs=refused_programs,
+        transitions=_transitions(scope, {id(item.target) for item in moving}, refused_programs),
+        files=_changed_files(robot, language, options, edits, header),
+        issues=_issues(robot, moving, after, spot_moves, edits),
+    )
+
+
+@dataclass(frozen=True)
+class _Header:
+    direction: str
+    kind: str
+    calibration_hash: str
+
+
+class _Kept:
+    """Tells what a refusal keeps as it was."""
+
+    def __init__(self, refused: Iterable[Refusal], programs: frozenset[str], partial: bool) -> None:
+        self._targets = {(refusal.program, refusal.target) for refusal in refused}
+        self._programs = programs
+        self._partial = partial
+
+    def __call__(self, programs: Collection[str], target: str) -> bool:
+        if self._partial:
+            return any((program, target) in self._targets for program in programs)
+        return any(program in self._programs for program in programs)
+
+
+def _refuse_twice(robot: Robot, calibration_hash: str) -> None:
+    for path, file in robot.files.items():
+        if calibration_hash in applied_calibrations(file.source):
+            message = "this calibration was applied to this file before: start from the original backup"
+            raise BadInputError("ALREADY_APPLIED", message, path)
+
+
+def _moves(moving: Moving, after: RigidTransform) -> bool:
+    return moving.target.pose is not None and moves_at_all(moving.target.pose, after)
+
+
+def _too_far(
+    moving: Sequence[Moving], after: Mapping[int, RigidTransform], options: CorrectionOptions
+) -> list[Refusal]:
+    furthest, widest = options.max_shift
+    found = []
+    for item in moving:
+        assert item.target.pose is not None  # noqa: S101
+        shift = float(distance_mm(item.target.pose, after[id(item)]))
+        turn = float(turn_deg(item.target.pose, after[id(item)]))
+        if shift > furthest or turn > widest:
+            message = f"would move {shift:.1f} mm and {turn:.2f} degrees; --max-shift allows {furthest:g},{widest:g}"
+            found += _refusals(item, "SHIFT_TOO_LARGE", message)
+    return found
+
+
+def _refusals(moving: Moving, code: str, message: str) -> list[Refusal]:
+    """One refusal for each program that goes to the target."""
+    first = {move.program: move for move in reversed(moving.moves)}
+    return [Refusal(name, moving.target.name, code, message, move.path, move.line) for name, move in first.items()]
+
+
+def _configure(
+    moving: Sequence[Moving],
+    after: Mapping[int, RigidTransform],
+    language: Language,
+    options: CorrectionOptions,
+    configurator: Configurator | None,
+    refused: list[Refusal],
+) -> dict[int, Mapping[str, float]]:
+    """Configurations by target; targets without one are added to ``refused``."""
+    carrying = [item for item in moving if language.has_configuration(item.target)]
+    if configurator is None:
+        if not options.keep_config:
+            message = (
+                "no kinematic model: status/turn or confdata cannot be computed; --keep-config keeps the old values"
+            )
+            for item in carrying:
+                refused += _refusals(item, "CONFIG_NOT_CHECKED", message)
+        return {}
+    found: dict[int, Mapping[str, float]] = {}
+    results = configurator.configure(carrying, [after[id(item)] for item in carrying])
+    for item, result in zip(carrying, results, strict=True):
+        if not result.refusal:
+            found[id(item)] = result.values
+        elif not options.keep_config:
+            refused += _refusals(item, "CONFIG_NOT_CHECKED", result.refusal)
+    return found
+
+
+def _refused_programs(scope: Scope, refused: Iterable[Refusal]) -> frozenset[str]:
+    """Programs with a refusal, and all that share a moved target with one of them."""
+    programs = {refusal.program for refusal in refused}
+    growing = True
+    while growing:
+        more = {name for item in scope.moving if item.programs & programs for name in item.programs} - programs
+        programs |= more
+        growing = bool(more)
+    return frozenset(programs)
+
+
+def _edits(
+    robot: Robot,
+    language: Language,
+    options: CorrectionOptions,
+    kept: _Kept,
+    moving: Sequence[Moving],
+    after: Mapping[int, RigidTransform],
+    configured: Mapping[int, Mapping[str, float]],
+    scope: Scope,
+    source2reference: RigidTransform,
+) -> list[PointEdit]:
+    made = templates(language.name, options.templates)
+    edits: list[PointEdit | None] = []
+    for item in moving:
+        if not kept(item.programs, item.target.name):
+            text = robot.files[item.target.path].source.text
+            edits.append(point_edit(item, after[id(item)], configured.get(id(item), {}), text, language, made))
+    for move in scope.offsets:
+        if not kept((move.program,), str(move.target)) and move.offset is not None and move.base is not None:
+            assert move.base.pose is not None  # noqa: S101
+            values = new_offset(move.offset, move.base.pose, source2reference)
+            edits.append(offset_edit(move, values, robot.files[move.offset.path].source.text, language, made))
+    return [edit for edit in edits if edit is not None]
+
+
+def _changed_files(
+    robot: Robot, language: Language, options: CorrectionOptions, edits: Sequence[PointEdit], header: _Header
+) -> dict[str, bytes]:
+    made = templates(language.name, options.templates)
+    by_path: dict[str, list[Edit]] = {}
+    for edit in edits:
+        by_path.setdefault(edit.path, []).append(edit.edit)
+    files: dict[str, bytes] = {}
+    for path, changes in by_path.items():
+        file = robot.files[path]
+        place = language.header_place(file)
+        if place is not None:
+            said = Header(__version__, header.direction, header.kind, file.source.sha256, header.calibration_hash)
+            changes = [*changes, Edit(place, made.header(said, file.source.newline), "header")]
+        files[path] = file.source.encode(splice(file.source.text, changes))
+    return files
+
+
+def _transitions(scope: Scope, moved: set[int], refused_programs: frozenset[str]) -> list[Transition]:
+    found = []
+    for routine in scope.routines:
+        if routine.program in refused_programs:
+            continue
+        moves = [move for move in routine.moves if move.target is not None]
+        for first, second in zip(moves, moves[1:], strict=False):
+            if (id(first.target) in moved) != (id(second.target) in moved):
+                found.append(
+                    Transition(str(first.target), str(second.target), routine.program, second.path, second.line)
+                )
+    return found
+
+
+def _issues(
+    robot: Robot,
+    moving: Sequence[Moving],
+    after: Mapping[int, RigidTransform],
+    spot_moves: Sequence[Move],
+    edits: Sequence[PointEdit],
+) -> list[Issue]:
+    issues = [Issue("NOT_CHECKED", "collisions are never checked: simulate or step through the programs before use")]
+    issues += _extrapolated(moving, spot_moves)
+    for path in dict.fromkeys(edit.path for edit in edits):
+        if LANGUAGES[robot.language].header_place(robot.files[path]) is None:
+            issues.append(Issue("NOT_CHECKED", "has no head line: it carries no header that says it was changed", path))
+    return issues
+
+
+def _extrapolated(moving: Sequence[Moving], spot_moves: Sequence[Move]) -> list[Issue]:
+    """One issue for all moved targets outside the hull of the fitted spots."""
+    spots = np.array([world.translation for move in spot_moves if (world := move.world) is not None]).reshape(-1, 3)
+    points = np.array(
+        [(item.base.pose * item.target.pose).translation for item in moving if item.base.pose is not None]
+    )
+    if not len(points) or not len(spots):
+        return []
+    outside = ~_inside(spots, points)
+    if not outside.any():
+        return []
+    nearest = np.linalg.norm(points[outside][:, None, :] - spots[None, :, :], axis=2).min(axis=1)
+    names = [item.target.name for item, out in zip(moving, outside, strict=True) if out]
+    farthest = names[int(nearest.argmax())]
+    message = (
+        f"{int(outside.sum())} of {len(points)} moved targets lie outside the hull of the {len(spots)} fitted spots; the "
+        f"farthest is {farthest}, {float(nearest.max()):.0f} mm from the nearest spot"
+    )
+    return [Issue("EXTRAPOLATED", message)]
+
+
+def _inside(spots: Array, points: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    own = (points[:, None, :] == spots[None, :, :]).all(axis=2).any(axis=1)
+    try:
+        return np.asarray(own | (Delaunay(spots).find_simplex(points) >= 0))
+    except QhullError:
+        return np.asarray(own)

@@ -1,0 +1,129 @@
+"""Reads written files again and compares them with what was intended, as a reader who does not know how they were made.
+
+The robot is read from the new bytes. Outside the numbers of changed literals and the one header nothing may differ, and
+every changed number must say the intended value to half its last digit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from respot.correction.correction import Correction
+from respot.correction.points import PointEdit
+from respot.languages.writing import header_span
+from respot.program.robot import ProgramFile, Robot
+from respot.program.targets import Number
+from respot.source import SourceText, Span
+from respot.tolerance import NumberStyle
+
+
+class VerifyError(Exception):
+    """What was written is not what was intended."""
+
+
+def prove(correction: Correction, old: Mapping[str, bytes], new: Mapping[str, bytes]) -> None:
+    """Prove that new files are the old ones with the intended numbers.
+
+    Parameters
+    ----------
+    correction : Correction
+        What was intended.
+    old, new : mapping of str to bytes
+        The backup before and as it was written.
+
+    Raises
+    ------
+    VerifyError
+        With the file, and the target where one is wrong.
+    """
+    changed = {path for path in old if new.get(path) != old[path]}
+    if set(old) != set(new) or changed - set(correction.files):
+        stray = sorted((set(old) ^ set(new)) | (changed - set(correction.files)))
+        raise VerifyError(f"{stray[0]}: is not as it was, though nothing of it should change")
+    own = {path: data for path, data in new.items() if path.startswith(correction.robot.root)}
+    robot = correction.language.read_robot(correction.robot.name, correction.robot.root, own)
+    literals_before, literals_after = _literals(correction.robot), _literals(robot)
+    for path in correction.files:
+        before, after = literals_before.get(path, []), literals_after.get(path, [])
+        edits = {edit.edit.span: edit for edit in correction.edits if edit.path == path}
+        _compare(path, correction.robot.files[path], robot.files[path], before, after, edits)
+
+
+#: Span of a literal and its numbers by field.
+_Literal = tuple[Span, Mapping[str, Number]]
+
+
+def _literals(robot: Robot) -> dict[str, list[_Literal]]:
+    """Literals that a correction may change, by file and in order: targets, and offsets along the base."""
+    found: dict[str, list[_Literal]] = {}
+    for target in robot.targets:
+        found.setdefault(target.path, []).append((target.span, target.numbers))
+    for move in robot.moves():
+        if move.offset is not None:
+            named = zip("xyz", move.offset.numbers, strict=True)
+            numbers = {name: number for name, number in named if number is not None}
+            found.setdefault(move.offset.path, []).append((move.offset.span, numbers))
+    return {path: sorted(literals, key=lambda literal: literal[0]) for path, literals in found.items()}
+
+
+def _compare(
+    path: str,
+    old: ProgramFile,
+    new: ProgramFile,
+    before: Sequence[_Literal],
+    after: Sequence[_Literal],
+    edits: Mapping[Span, PointEdit],
+) -> None:
+    if len(before) != len(after):
+        raise VerifyError(f"{path}: has {len(after)} positions where it had {len(before)}")
+    old_cuts, new_cuts = _header(old), _header(new)
+    for (old_span, old_numbers), (new_span, new_numbers) in zip(before, after, strict=True):
+        edit = edits.get(old_span)
+        if edit is None:
+            continue
+        names = [name for name in edit.intended if name in new_numbers]
+        old_cuts += [old_numbers[name].span for name in names if name in old_numbers]
+        new_cuts += _added(new.source, new_span, [new_numbers[name] for name in names if name not in old_numbers])
+        new_cuts += [new_numbers[name].span for name in names if name in old_numbers]
+        _check_values(path, new.source, edit, new_numbers)
+    if _cut(old.source.text, old_cuts) != _cut(new.source.text, new_cuts):
+        raise VerifyError(f"{path}: differs outside the numbers of moved targets")
+
+
+def _check_values(path: str, source: SourceText, edit: PointEdit, numbers: Mapping[str, Number]) -> None:
+    for name, value in edit.intended.items():
+        number = numbers.get(name)
+        if number is None:
+            if abs(value) > 1e-3:
+                raise VerifyError(f"{path}: {edit.target} lacks {name}")
+            continue
+        style = NumberStyle.of(source.text[slice(*number.span)])
+        if abs(float(number.value) - value) > style.half_digit * (1.0 + 1e-6) + 1e-12:
+            raise VerifyError(f"{path}: {edit.target} has {name} {number.value}, {value:.9f} was intended")
+
+
+def _header(file: ProgramFile) -> list[Span]:
+    """Span of our header below the first head line, if any."""
+    head = next((s for s in file.statements if s.kind in ("routine", "function", "data_list", "module")), None)
+    if head is None:
+        return []
+    start, end = header_span(file.source, file.source.place(head.end)[0])
+    return [(start, end)] if end > start else []
+
+
+def _added(source: SourceText, literal: Span, numbers: Sequence[Number]) -> list[Span]:
+    """Spans of members that a relative motion got in addition: from the comma before each to its last digit."""
+    spans = []
+    for number in numbers:
+        comma = source.text.rfind(",", literal[0], number.span[0])
+        spans.append((comma, number.span[1]))
+    return spans
+
+
+def _cut(text: str, spans: Sequence[Span]) -> str:
+    parts, position = [], 0
+    for start, end in sorted(spans):
+        parts.append(text[position:start])
+        position = end
+    parts.append(text[position:])
+    return "".join(parts)

@@ -1,0 +1,54 @@
+"""What a language offers to the rest of respot."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from scipy.spatial.transform import RigidTransform
+
+from respot.languages.forms import Forms
+from respot.program.robot import ProgramFile, Robot
+from respot.program.targets import Target
+from respot.source import Span
+
+
+@dataclass(frozen=True)
+class Language:
+    """A robot language.
+
+    Parameters
+    ----------
+    name : str
+        Name in JSON and folder of its templates.
+    title : str
+        Name for people.
+    suffixes : sequence of str
+        Suffixes of its program files.
+    forms : Forms
+        Its instruction forms.
+    read_robot : callable
+        ``read_robot(name, root, files)`` reads the files of one robot.
+    pose_values : callable
+        Fields of a target for a new pose in its base.
+    decimals : mapping of str to int
+        Decimals that a changed field gets at least; ``offset`` fields follow the first length.
+    has_configuration : callable
+        Whether a target carries status and turn or confdata.
+    header_place : callable
+        Where the header of a changed file goes.
+    position_fields, rotation_fields : sequence of str
+        Names of a target's fields.
+    """
+
+    name: str
+    title: str
+    suffixes: Sequence[str]
+    forms: Forms
+    read_robot: Callable[[str, str, Mapping[str, bytes]], Robot]
+    pose_values: Callable[[Target, RigidTransform], dict[str, float]]
+    decimals: Mapping[str, int]
+    has_configuration: Callable[[Target], bool]
+    header_place: Callable[[ProgramFile], Span | None]
+    position_fields: Sequence[str]
+    rotation_fields: Sequence[str]

@@ -1,0 +1,40 @@
+"""What RAPID literals become when their target moves, and where the header of a changed file stands."""
+
+from __future__ import annotations
+
+from scipy.spatial.transform import RigidTransform
+
+from respot.geometry import quaternion_from_rotation
+from respot.languages.writing import header_span
+from respot.program.robot import ProgramFile
+from respot.program.targets import Target
+from respot.source import Span
+from respot.tolerance import LENGTH_DECIMALS, QUATERNION_DECIMALS
+
+_POSITION = ("x", "y", "z")
+_QUATERNION = ("q1", "q2", "q3", "q4")
+DECIMALS = {
+    **dict.fromkeys(_POSITION, LENGTH_DECIMALS),
+    **dict.fromkeys(_QUATERNION, QUATERNION_DECIMALS),
+    **dict.fromkeys(("cf1", "cf4", "cf6", "cfx"), 0),
+}
+
+
+def pose_values(target: Target, pose: RigidTransform) -> dict[str, float]:
+    """New values of a target's fields, for ``pose`` in its work object: x, y, z in mm, q1 to q4 near the old ones."""
+    old = [target.number(name) or 0.0 for name in _QUATERNION]
+    values = [*pose.translation, *quaternion_from_rotation(pose.rotation, near=old)]
+    return {name: float(value) for name, value in zip(_POSITION + _QUATERNION, values, strict=True)}
+
+
+def has_configuration(target: Target) -> bool:
+    """Whether the target carries confdata; a robtarget always does."""
+    return "cf1" in target.numbers
+
+
+def header_place(file: ProgramFile) -> Span | None:
+    """Where the header goes or stands: below MODULE; None in a fragment without one."""
+    head = next((statement for statement in file.statements if statement.kind == "module"), None)
+    if head is None:
+        return None
+    return header_span(file.source, file.source.place(head.end)[0])

@@ -1,0 +1,176 @@
+"""Changed text comes from templates: literals with the gaps and number style of their source, and the header.
+
+Robot-code templates use ``<< >>``, ``<% %>`` and ``<# #>``, since KRL has braces of its own; they render with line feeds
+and get the file's line end afterwards. Text of a program reaches a template as data only.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from functools import cache
+from pathlib import Path
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from respot.program.targets import Number
+from respot.resources import resource
+from respot.source import SourceText, Span
+from respot.tolerance import NumberStyle, spell
+
+
+@dataclass(frozen=True)
+class Change:
+    """A number of a literal and what it becomes.
+
+    Parameters
+    ----------
+    number : Number
+        The number as it stands.
+    value : float or Decimal
+        Its new value.
+    style : NumberStyle
+        How the new value is spelled.
+    """
+
+    number: Number
+    value: Decimal | float
+    style: NumberStyle
+
+
+@dataclass(frozen=True)
+class Field:
+    """What a template gets for one number: the text before it, its value and its style."""
+
+    gap: str
+    value: Decimal | float
+    style: NumberStyle
+
+
+@dataclass(frozen=True)
+class Header:
+    """What the header of a changed file says.
+
+    Parameters
+    ----------
+    version : str
+        Version of respot.
+    direction : str
+        ``align`` or ``compensate``.
+    kind : str
+        ``theory`` or ``measured``.
+    source_sha256, calibration_sha256 : str
+        Hash of the file before the change and of the calibration.
+    """
+
+    version: str
+    direction: str
+    kind: str
+    source_sha256: str
+    calibration_sha256: str
+
+
+class Templates:
+    """The templates of one language.
+
+    Parameters
+    ----------
+    language : str
+        Folder under ``templates``.
+    overlay : Path, optional
+        A plant's own templates; its ``<language>`` folder is searched first.
+    """
+
+    def __init__(self, language: str, overlay: Path | None = None) -> None:
+        folders = [resource("templates", language)]
+        if overlay is not None:
+            folders.insert(0, overlay / language)
+        # robot code is no HTML: escaping would change it
+        self._environment = Environment(  # noqa: S701
+            loader=FileSystemLoader(folders),
+            block_start_string="<%",
+            block_end_string="%>",
+            variable_start_string="<<",
+            variable_end_string=">>",
+            comment_start_string="<#",
+            comment_end_string="#>",
+            undefined=StrictUndefined,
+            autoescape=False,
+            keep_trailing_newline=False,
+        )
+        self._environment.filters["spell"] = spell
+
+    def literal(self, text: str, span: Span, changes: Iterable[Change]) -> str:
+        """Text of a literal with some of its numbers changed.
+
+        Parameters
+        ----------
+        text : str
+            The file.
+        span : tuple
+            Span of the literal.
+        changes : iterable of Change
+            Numbers within the span, in any order.
+        """
+        fields: list[Field] = []
+        position, end = span
+        for change in sorted(changes, key=lambda change: change.number.span):
+            fields.append(Field(text[position : change.number.span[0]], change.value, change.style))
+            position = change.number.span[1]
+        return self._environment.get_template("literal.j2").render(fields=fields, tail=text[position:end])
+
+    def complete(self, literal: str, missing: Mapping[str, float], style: NumberStyle) -> str:
+        """Text of a literal with components that it left out."""
+        template = self._environment.get_template("complete.j2")
+        return template.render(literal=literal, missing=missing, style=style)
+
+    def header(self, header: Header, newline: str) -> str:
+        """Text of the header, every line ended."""
+        text = self._environment.get_template("header.j2").render(header=header)
+        return "".join(line + newline for line in text.splitlines())
+
+
+@cache
+def templates(language: str, overlay: Path | None = None) -> Templates:
+    """Return the templates of a language, loaded once."""
+    return Templates(language, overlay)
+
+
+#: A line of a header of ours, whatever the comment mark: ``;respot: ..``, ``  !respot: ..``
+_HEADER_LINE = re.compile(r"[ \t]*[;!]respot: [^\r\n]*(?:\r*\n|\r|$)")
+_APPLIED = re.compile(r"[;!]respot: calibration sha256 ([0-9a-f]{64})")
+
+
+def header_span(source: SourceText, after_line: int) -> Span:
+    """Span of our header below a line: empty, at the start of the next line, if there is none."""
+    starts = source.line_starts
+    start = starts[after_line] if after_line < len(starts) else len(source.text)
+    end = start
+    while match := _HEADER_LINE.match(source.text, end):
+        if match.end() == end:
+            break
+        end = match.end()
+    return start, end
+
+
+def applied_calibrations(source: SourceText) -> set[str]:
+    """Hashes of the calibrations that the file's header names."""
+    return set(_APPLIED.findall(source.text))
+
+
+def changes_of(
+    text: str, numbers: Mapping[str, Number], values: Mapping[str, float], decimals: Mapping[str, int]
+) -> Sequence[Change]:
+    """Changes of a literal's fields to new values, each with its source's decimals but at least ``decimals``.
+
+    A field whose new value spells like the old one, digit by digit, stays as it is.
+    """
+    changes = []
+    for name, value in values.items():
+        number = numbers[name]
+        style = NumberStyle.of(text[slice(*number.span)]).at_least(decimals[name])
+        if spell(value, style) != spell(number.value, style):
+            changes.append(Change(number, value, style))
+    return changes

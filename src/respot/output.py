@@ -1,0 +1,101 @@
+"""Staging, read back and prove, move into place.
+
+Everything is written into a hidden folder beside the output folder, read again from there, compared with what was
+intended, and renamed in one step. An interrupt or an error leaves no half-written folder.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+
+from respot.correction.correction import Correction
+from respot.correction.proof import prove
+from respot.issues import BadInputError
+
+RECORD = "respot.json"
+
+
+def check_output(folder: Path, force: bool) -> None:
+    """Refuse an output folder that would lose something.
+
+    Raises
+    ------
+    BadInputError
+        ``OUTPUT_EXISTS`` if it is a file, or holds anything and ``force`` is not given.
+    """
+    if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
+        raise BadInputError("OUTPUT_EXISTS", "is not a folder; name another one with -o", str(folder))
+    if folder.is_dir() and any(folder.iterdir()) and not force:
+        message = "exists and is not empty; name another one with -o, or replace it with --force"
+        raise BadInputError("OUTPUT_EXISTS", message, str(folder))
+
+
+def write_backup(
+    folder: Path, files: Mapping[str, bytes], correction: Correction, record: Mapping[str, object], force: bool = False
+) -> None:
+    """Write a whole backup with the corrected files in it, all or nothing.
+
+    Parameters
+    ----------
+    folder : Path
+        Output folder.
+    files : mapping of str to bytes
+        The backup as it was.
+    correction : Correction
+        Its changed files.
+    record : mapping
+        What becomes ``respot.json``.
+    force : bool
+        Replace a folder that exists.
+
+    Raises
+    ------
+    BadInputError
+        ``OUTPUT_EXISTS`` or ``CANNOT_READ`` (the folder cannot be written).
+    VerifyError
+        What was written is not what was intended; nothing is left behind.
+    """
+    check_output(folder, force)
+    folder = folder.absolute()
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        staging = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
+    except OSError as error:
+        raise BadInputError("CANNOT_READ", f"cannot be written: {error.strerror}", str(folder)) from error
+    try:
+        staging.chmod(0o755)
+        for path, data in {**files, **correction.files}.items():
+            place = staging / path
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.write_bytes(data)
+        written = {path: (staging / path).read_bytes() for path in files}
+        prove(correction, files, written)
+        text = json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+        (staging / RECORD).write_text(text, encoding="utf-8", newline="\n")
+        _move(staging, folder)
+    except OSError as error:
+        raise BadInputError("CANNOT_READ", f"cannot be written: {error.strerror}", str(folder)) from error
+    finally:
+        shutil.rmtree(staging, ignore_errors=True)
+
+
+def _move(staging: Path, folder: Path) -> None:
+    """Rename staging to the output folder; an old one goes away only when the new one is in place."""
+    if not folder.exists():
+        os.replace(staging, folder)
+        return
+    old = Path(tempfile.mkdtemp(prefix=f".{folder.name}.old.", dir=folder.parent))
+    try:
+        os.replace(folder, old)
+        try:
+            os.replace(staging, folder)
+        except BaseException:
+            os.replace(old, folder)
+            raise
+    finally:
+        shutil.rmtree(old, ignore_errors=True)

@@ -1,0 +1,351 @@
+"""How fast programs are read, against the plain grammar, in one run.
+
+Usage: ``python tests/bench/bench_read.py [--megabytes 5] [--repeat 3] [--memory] [--corpus PATH...]``
+
+Both sides turn bytes into statements and read every number of every member of every aggregate, as a number with its place;
+what they find is compared. The baseline is our own grammar on the whole file: Lark, LALR, contextual lexer, Python's
+default garbage collector. ``--corpus`` takes what `scripts/corpus.py` takes; without it the mixed programs are made up.
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+import sys
+import time
+import tracemalloc
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from lark import Lark, Token, Tree
+from lark.exceptions import LarkError
+
+from respot.languages.krl import syntax as krl
+from respot.languages.rapid import syntax as rapid
+from respot.languages.shapes import Shapes
+from respot.program.statement import Statement
+from respot.resources import resource
+from respot.source import SourceText, Span
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
+
+#: A number of a target and its place.
+Field = tuple[float, Span]
+Fields = list[Field]
+
+
+@dataclass(frozen=True)
+class Language:
+    """What the benchmark needs of a language."""
+
+    shapes: Shapes
+    encodings: tuple[str, ...]
+    read: Callable[[str, list[int]], list[Statement]]
+    kinds: frozenset[str]
+
+
+LANGUAGES = {
+    "krl": Language(
+        krl.SHAPES, krl.ENCODINGS, krl.read_statements, frozenset(("declaration", "assignments", "motion"))
+    ),
+    "rapid": Language(rapid.SHAPES, rapid.ENCODINGS, rapid.read_statements, frozenset(("data", "call"))),
+}
+
+
+# ours
+
+
+def ours(data: bytes, language: Language) -> Iterator[Fields]:
+    """Numbers of each statement that holds an aggregate."""
+    source = SourceText("", data, language.encodings)
+    for statement in language.read(source.text, source.line_starts):
+        if statement.kind in language.kinds:
+            numbers = statement.numbers()
+            if numbers.spans:
+                yield list(zip(numbers.values, numbers.spans, strict=True))
+
+
+# baseline
+
+
+def baseline(data: bytes, language: Language, lark: Lark) -> Iterator[Fields]:
+    """Return the same from the tree of the whole file."""
+    source = SourceText("", data, language.encodings)
+    for statement in lark.parse(source.text).children:
+        if isinstance(statement, Tree) and statement.data in language.kinds:
+            fields: Fields = []
+            _collect(statement, fields)
+            if fields:
+                yield fields
+
+
+def _collect(tree: Tree[Token], fields: Fields) -> None:
+    for child in tree.children:
+        if not isinstance(child, Tree):
+            continue
+        if child.data == "number":
+            _add(child, 1.0, None, fields)
+        elif child.data == "signed" and _is_number(child):
+            sign, start = 1.0, None
+            while child.data == "signed":
+                start = child.children[0].start_pos if start is None else start
+                sign = -sign if child.children[0] == "-" else sign
+                child = child.children[1]
+            _add(child, sign, start, fields)
+        else:
+            _collect(child, fields)
+
+
+def _is_number(tree: Tree[Token]) -> bool:
+    inner = tree.children[1]
+    return isinstance(inner, Tree) and (inner.data == "number" or (inner.data == "signed" and _is_number(inner)))
+
+
+def _add(tree: Tree[Token], sign: float, start: int | None, fields: Fields) -> None:
+    token = tree.children[0]
+    assert isinstance(token, Token) and token.start_pos is not None and token.end_pos is not None
+    fields.append((sign * float(token), (token.start_pos if start is None else start, token.end_pos)))
+
+
+# input
+
+
+def krl_table(size: int, seed: int = 1) -> bytes:
+    """Return a data list as a pendant writes it: points, FDAT and PDAT lines, comments."""
+    dice = random.Random(seed)
+    lines = ["&ACCESS RVP", "&REL 12", "DEFDAT  SPOTS PUBLIC", ";FOLD EXTERNAL DECLARATIONS;%{PE}%MKUKATPBASIS"]
+    total, number = 0, 0
+    while total < size:
+        number += 1
+        xyz = ",".join(f"{axis} {dice.uniform(-2500, 2500):.6g}" for axis in "XYZ")
+        abc = ",".join(f"{axis} {dice.uniform(-180, 180):.6g}" for axis in "ABC")
+        external = ",".join(f"E{i} 0.0" for i in range(1, 7))
+        base = dice.randrange(1, 9)
+        new = [
+            f"DECL E6POS XP{number}={{{xyz},{abc},S {dice.choice((2, 6, 22))},T {dice.randrange(64)},{external}}}",
+            f'DECL FDAT FP{number}={{TOOL_NO {dice.randrange(1, 16)},BASE_NO {base},IPO_FRAME #BASE,POINT2[] " ",TQ_STATE FALSE}}',
+            f"DECL PDAT PPDAT{number}={{VEL {dice.randrange(10, 101)}.000,ACC 100.000,APO_DIST 100.000,APO_MODE #CDIS}}",
+        ]
+        if number % 10 == 0:
+            new.append(f"; station {number}")
+        lines += new
+        total += sum(map(len, new)) + 2 * len(new)
+    return "\r\n".join([*lines, ";ENDFOLD", "ENDDAT", ""]).encode("cp1252")
+
+
+def rapid_table(size: int, seed: int = 1) -> bytes:
+    """Return a module of robtargets."""
+    dice = random.Random(seed)
+    lines, total, number = ["MODULE Spots"], 0, 0
+    while total < size:
+        number += 1
+        xyz = ",".join(f"{dice.uniform(-2500, 2500):.7g}" for _ in range(3))
+        quaternion = ",".join(f"{dice.uniform(-1, 1):.9g}" for _ in range(4))
+        configuration = f"{dice.randrange(-2, 2)},{dice.randrange(-2, 2)},{dice.randrange(-2, 2)},0"
+        line = f"  CONST robtarget p{number}:=[[{xyz}],[{quaternion}],[{configuration}],[9E+09,9E+09,9E+09,9E+09,9E+09,9E+09]];"
+        lines.append(line)
+        total += len(line) + 2
+    return "\r\n".join([*lines, "ENDMODULE", ""]).encode("latin-1")
+
+
+def krl_programs(size: int, seed: int = 1) -> list[bytes]:
+    """Return programs with inline forms, logic and calls; about one new shape of statement in fifty lines."""
+    dice = random.Random(seed)
+    programs, total = [], 0
+    while total < size:
+        programs.append(_program(dice, len(programs)))
+        total += len(programs[-1])
+    return programs
+
+
+def _program(dice: random.Random, index: int) -> bytes:
+    lines = [
+        "&ACCESS RVP",
+        f"&REL {dice.randrange(1, 400)}",
+        f"DEF STYLE{index} ( )",
+        "DECL INT COUNT, STATE",
+        "BOOL DONE",
+    ]
+    for _ in range(dice.randrange(20, 120)):
+        lines += dice.choice((_form, _form, _condition, _assignment, _trigger, _wait, _loop))(dice)
+    return "\r\n".join([*lines, "END", ""]).encode("cp1252")
+
+
+def _form(dice: random.Random) -> list[str]:
+    point, tool, base = dice.randrange(1, 300), dice.randrange(1, 16), dice.randrange(1, 32)
+    kind, speed = dice.choice((("PTP", "100 %"), ("LIN", "0.5 m/s")))
+    letter, group = ("P", "PTP_PARAMS,100") if kind == "PTP" else ("L", "CP_PARAMS,0.5")
+    blend = dice.choice(("", " C_DIS", " C_DIS C_DIS"))
+    return [
+        f";FOLD {kind} P{point} Vel={speed} {letter}DAT{point} Tool[{tool}] Base[{base}];%{{PE}}%R 8.3.22,%MKUKATPBASIS,%CMOVE,%V{kind}",
+        "$BWDSTART=FALSE",
+        f"{letter}DAT_ACT={letter}{letter}DAT{point}",
+        f"FDAT_ACT=FP{point}",
+        f"BAS(#{group})",
+        f"{kind} XP{point}{blend}",
+        ";ENDFOLD",
+    ]
+
+
+def _term(dice: random.Random, depth: int = 0) -> str:
+    choice = dice.randrange(9 if depth < 2 else 5)
+    if choice == 0:
+        return str(dice.randrange(100))
+    if choice == 1:
+        return f"{dice.uniform(-50, 50):.3f}"
+    if choice < 4:
+        return dice.choice(("COUNT", "STATE", "$VEL.CP", "OFFSET", "$POS_ACT.X", f"TABLE[{dice.randrange(9)}]"))
+    if choice == 4:
+        return f"$IN[{dice.randrange(1, 1024)}]"
+    if choice == 5:
+        return f"ABS({_term(dice, depth + 1)})"
+    if choice == 6:
+        return f"({_term(dice, depth + 1)}{dice.choice('+-*/')}{_term(dice, depth + 1)})"
+    return f"{_term(dice, depth + 1)} {dice.choice('+-*/')} {_term(dice, depth + 1)}"
+
+
+def _test(dice: random.Random) -> str:
+    tests = [
+        f"({_term(dice, 1)}{dice.choice(('==', '<>', '>', '<='))}{_term(dice, 1)})" for _ in range(dice.randrange(1, 3))
+    ]
+    return dice.choice((" AND ", " OR ")).join(tests)
+
+
+def _condition(dice: random.Random) -> list[str]:
+    return [f"IF {_test(dice)} THEN", *(f"  {line}" for line in _assignment(dice)), "ENDIF"]
+
+
+def _assignment(dice: random.Random) -> list[str]:
+    return [f"{dice.choice(('COUNT', 'STATE', 'OFFSET', '$OUT[12]', 'TABLE[3].X'))} = {_term(dice)} ; set"]
+
+
+def _trigger(dice: random.Random) -> list[str]:
+    return [
+        f"TRIGGER WHEN DISTANCE={dice.randrange(2)} DELAY={dice.randrange(-99, 99)} DO GUN({_term(dice, 2)},TRUE) PRIO=-1"
+    ]
+
+
+def _wait(dice: random.Random) -> list[str]:
+    return [f"WAIT FOR {_test(dice)}", f"WAIT SEC 0.{dice.randrange(1, 9)}"]
+
+
+def _loop(dice: random.Random) -> list[str]:
+    target = f"{{X {_term(dice, 3)},Y {dice.uniform(-9, 9):.2f},Z 0,A 0,B 90,C 0}}"
+    return [
+        f"FOR COUNT=1 TO {dice.randrange(2, 50)}",
+        f"  LIN_REL {target} C_DIS",
+        f"  CALL{dice.randrange(9)}(COUNT,,#FAST)",
+        "ENDFOR",
+    ]
+
+
+# one case
+
+
+def measure(name: str, files: list[bytes], language: Language, repeat: int) -> float:
+    """Print one line of the table and return the ratio."""
+    lark = Lark(
+        resource("grammars", f"{language.shapes._grammar}.lark").read_text(encoding="utf-8"),
+        parser="lalr",
+        start="file",
+    )
+    _ = language.shapes.keywords
+    begin = time.perf_counter()
+    expected: list[list[Fields]] = []
+    readable: list[bytes] = []
+    failed = 0.0
+    for data in files:
+        start = time.perf_counter()
+        try:
+            expected.append(list(baseline(data, language, lark)))
+            readable.append(data)
+        except LarkError:
+            failed += time.perf_counter() - start
+    slow = time.perf_counter() - begin - failed
+    best = float("inf")
+    for _ in range(repeat):
+        _forget(language)
+        begin = time.perf_counter()
+        for data in readable:
+            for _fields in ours(data, language):
+                pass
+        best = min(best, time.perf_counter() - begin)
+    different = sum(list(ours(data, language)) != fields for data, fields in zip(readable, expected, strict=True))
+    size = sum(map(len, readable)) / 1e6
+    share = f"{len(readable)}/{len(files)}"
+    print(
+        f"{name:24} {size:7.2f} {share:>9} {size / slow:9.2f} {size / best:9.2f} {slow / best:7.1f}x {different:9}",
+        flush=True,
+    )
+    return slow / best
+
+
+def _forget(language: Language) -> None:
+    """Empty every cache, so that each shape is parsed within the measured time."""
+    shapes = language.shapes
+    shapes._units.clear()
+    shapes._parts.clear()
+    shapes._kinds.clear()
+    if language.shapes is krl.SHAPES:
+        krl._LINES.clear()
+
+
+def memory(name: str, data: bytes, language: Language) -> None:
+    """Print the peak of traced memory while a file is read, as a multiple of its size."""
+    _forget(language)
+    list(ours(b"", language))
+    tracemalloc.start()
+    source = SourceText("", data, language.encodings)
+    statements = language.read(source.text, source.line_starts)
+    held = tracemalloc.get_traced_memory()[0]
+    for statement in statements:
+        if statement.kind in language.kinds:
+            _ = statement.numbers().values
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    print(f"{name:24} statements {held / len(data):5.1f}x the file, peak {peak / len(data):5.1f}x")
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--megabytes", type=float, default=5.0)
+    parser.add_argument("--repeat", type=int, default=3)
+    parser.add_argument("--memory", action="store_true")
+    parser.add_argument("--language", choices=sorted(LANGUAGES), action="append")
+    parser.add_argument("--corpus", type=Path, nargs="+", default=[], help="repositories of real programs (krl)")
+    arguments = parser.parse_args()
+    size = int(arguments.megabytes * 1e6)
+    cases: list[tuple[str, str, list[bytes]]] = [
+        ("KRL point table", "krl", [krl_table(size)]),
+        ("KRL programs, made up", "krl", krl_programs(size)),
+        ("RAPID point table", "rapid", [rapid_table(size)]),
+    ]
+    if arguments.corpus:
+        import corpus
+
+        known = corpus.LANGUAGES["krl"]
+        found = [
+            data
+            for path in arguments.corpus
+            for _, place in corpus.repositories(path)
+            for _, data in corpus.files(place, known.suffixes)
+        ]
+        cases.insert(2, ("KRL programs, corpus", "krl", [data for data in found if _is_krl(data)]))
+    cases = [case for case in cases if not arguments.language or case[1] in arguments.language]
+    print(f"{'':24} {'MB':>7} {'files':>9} {'Lark MB/s':>9} {'ours MB/s':>9} {'ratio':>8} {'different':>9}")
+    for name, language, files in cases:
+        measure(name, files, LANGUAGES[language], arguments.repeat)
+    if arguments.memory:
+        for name, language, files in cases:
+            if len(files) == 1:
+                memory(name, files[0], LANGUAGES[language])
+
+
+def _is_krl(data: bytes) -> bool:
+    return krl.looks_like_krl(SourceText("", data, krl.ENCODINGS).text)
+
+
+if __name__ == "__main__":
+    main()
