@@ -105,7 +105,7 @@ LANGUAGES = {
     "rapid": Language(
         frozenset((".mod", ".modx", ".sys", ".sysx", ".prg")),
         rapid.ENCODINGS,
-        lambda data, source: looks_like_rapid(data),
+        lambda data, _source: looks_like_rapid(data),
         rapid.read_statements,
         rapid.NO_STATEMENT,
         "!",

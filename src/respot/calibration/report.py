@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from respot.calibration.uncertainty import PARAMETERS
+from respot.geometry import abc_from_rotation
 from respot.registration.statistics import distances, rms
 
 if TYPE_CHECKING:
@@ -81,7 +82,7 @@ def _transform(fit: SpotFit) -> dict[str, Any]:
     return {
         "rotation": rotation.tolist(),
         "translation": fit.calibration.translation.tolist(),
-        "abc": _abc(Rotation.from_matrix(rotation)).tolist(),
+        "abc": abc_from_rotation(Rotation.from_matrix(rotation)).tolist(),
         "covariance": sure.covariance.tolist(),
         "centroid": sure.centroid.tolist(),
         "sigma": sure.sigma,
@@ -91,7 +92,7 @@ def _transform(fit: SpotFit) -> dict[str, Any]:
 
 def _spots(fit: SpotFit) -> list[dict[str, Any]]:
     points, turned = fit.calibration.predict(fit.source, fit.source_rotations)
-    angles = None if turned is None else _abc(turned)
+    angles = None if turned is None else abc_from_rotation(turned)
     residuals = fit.robust.rigid.residuals
     as_found, before, after = (np.linalg.norm(v, axis=1) for v in (fit.as_found, fit.before.residuals, residuals))
     rows = []
@@ -121,12 +122,6 @@ def _spots(fit: SpotFit) -> list[dict[str, Any]]:
             }
         )
     return rows
-
-
-def _abc(rotations: Rotation) -> Array:
-    """KUKA A, B, C [deg]: R = Rz(A) Ry(B) Rx(C)."""
-    result: Array = np.asarray(rotations.as_euler("ZYX", degrees=True, suppress_warnings=True)) + 0.0
-    return result
 
 
 def _number(value: float) -> float | None:

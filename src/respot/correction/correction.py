@@ -157,7 +157,7 @@ def align(
         refused_programs=refused_programs,
         transitions=_transitions(scope, {id(item.target) for item in moving}, refused_programs),
         files=_changed_files(robot, language, options, edits, header),
-        issues=_issues(robot, moving, after, spot_moves, edits),
+        issues=_issues(robot, moving, spot_moves, edits),
     )
 
 
@@ -313,7 +313,6 @@ def _transitions(scope: Scope, moved: set[int], refused_programs: frozenset[str]
 def _issues(
     robot: Robot,
     moving: Sequence[Moving],
-    after: Mapping[int, RigidTransform],
     spot_moves: Sequence[Move],
     edits: Sequence[PointEdit],
 ) -> list[Issue]:
@@ -328,9 +327,8 @@ def _issues(
 def _extrapolated(moving: Sequence[Moving], spot_moves: Sequence[Move]) -> list[Issue]:
     """One issue for all moved targets outside the hull of the fitted spots."""
     spots = np.array([world.translation for move in spot_moves if (world := move.world) is not None]).reshape(-1, 3)
-    points = np.array(
-        [(item.base.pose * item.target.pose).translation for item in moving if item.base.pose is not None]
-    )
+    worlds = [world for item in moving if (world := item.moves[0].world) is not None]
+    points = np.array([world.translation for world in worlds]).reshape(-1, 3)
     if not len(points) or not len(spots):
         return []
     outside = ~_inside(spots, points)

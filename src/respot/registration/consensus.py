@@ -20,6 +20,11 @@ TRIALS = 1000  # half of the pairs wrong: the chance to miss three good ones 100
 _KEPT, _STEPS, _SCORED_ROWS = 5, 3, 2000
 
 
+def quota_of(n: int) -> int:
+    """Return how many of n pairs have to agree: 45 %, at least 4."""
+    return min(max(ceil(0.45 * n), 4), n)
+
+
 def consensus_transform(source: Array, reference: Array, *, seed: int, trials: int = TRIALS) -> tuple[Array, Array]:
     """Rotation and translation that the closest 45 % of the pairs agree on best.
 
@@ -36,7 +41,7 @@ def consensus_transform(source: Array, reference: Array, *, seed: int, trials: i
         order = rng.choice(order, _SCORED_ROWS, replace=False)
     source, reference = source[order], reference[order]
     n = len(source)
-    quota = min(max(ceil(0.45 * n), 4), n)
+    quota = quota_of(n)
     if comb(n, 3) <= trials:
         triples = np.array(list(combinations(range(n), 3)))
     else:

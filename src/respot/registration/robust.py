@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
-from respot.registration.consensus import consensus_transform
+from respot.registration.consensus import consensus_transform, quota_of
 from respot.registration.errors import DegenerateError, RegistrationError
 from respot.registration.rigid import RigidFit, check_pairs, fit_rigid, transform_of
 
@@ -90,11 +90,13 @@ def fit_robust(source: ArrayLike, reference: ArrayLike, *, seed: int = 0) -> Rob
     step = max(1, -(-len(first) // _SAMPLE))
     sample, target = first[::step], second[::step]
 
-    candidates = [("least-squares", _settle(sample, target, (plain.rotation, plain.translation)))]
-    candidates.append(("consensus", _settle(sample, target, consensus_transform(sample, target, seed=seed))))
-    scales = [robust_scale(_lengths(sample, target, found)) for _, found in candidates]
-    start, transform = candidates[1 if scales[1] < _MANY_BAD * scales[0] else 0]
-    inliers, scale = _inliers(first, second, transform)
+    start, transform = "least-squares", _settle(sample, target, (plain.rotation, plain.translation))
+    scale = robust_scale(_lengths(sample, target, transform))
+    agreed = consensus_transform(sample, target, seed=seed)
+    agreed_scale = _quota_scale(_lengths(sample, target, agreed))
+    if _inliers(sample, target, agreed, agreed_scale)[1] < _MANY_BAD * _inliers(sample, target, transform, scale)[1]:
+        start, transform, scale = "consensus", agreed, agreed_scale
+    inliers, scale = _inliers(first, second, transform, scale)
     try:
         rigid = fit_rigid(first, second, inliers.astype(np.float64))
     except DegenerateError as error:
@@ -103,6 +105,16 @@ def fit_robust(source: ArrayLike, reference: ArrayLike, *, seed: int = 0) -> Rob
         inliers, rigid, start = np.ones(len(first), dtype=bool), plain, "least-squares"
     lengths = np.linalg.norm(rigid.residuals, axis=1)
     return RobustFit(rigid, inliers, _tukey(lengths / scale), scale, INLIER_CHI * scale, start)
+
+
+def _quota_scale(lengths: Array) -> float:
+    """Noise per coordinate from the closest 45 % alone, as `robust_scale` from the closest half."""
+    n = len(lengths)
+    quota = quota_of(n)
+    factor = np.sqrt(3.0 * quota / (3.0 * quota - RIGID_PARAMETERS))
+    return max(
+        float(np.partition(lengths, quota - 1)[quota - 1] / stats.chi.ppf(quota / (n + 1), 3) * factor), SCALE_FLOOR
+    )
 
 
 def _lengths(source: Array, reference: Array, transform: Transform) -> Array:
@@ -144,18 +156,17 @@ def _tukey(ratio: Array) -> Array:
     return weights
 
 
-def _inliers(source: Array, reference: Array, transform: Transform) -> tuple[NDArray[np.bool_], float]:
-    """Settle the set of inliers: least squares over them, scale from their median, threshold, until it stays."""
+def _inliers(source: Array, reference: Array, transform: Transform, scale: float) -> tuple[NDArray[np.bool_], float]:
+    """Settle the set of inliers: threshold, least squares over them, scale from their median, until the set stays."""
     inliers = np.ones(len(source), dtype=bool)
-    scale = SCALE_FLOOR
     seen: set[bytes] = set()
     for _ in range(_TURNS):
         lengths = _lengths(source, reference, transform)
-        scale = robust_scale(lengths[inliers])
         inliers = lengths <= INLIER_CHI * scale
         key = np.packbits(inliers).tobytes()
         if key in seen or int(inliers.sum()) < 4:
             break
         seen.add(key)
         transform = transform_of(source[inliers], reference[inliers])
+        scale = robust_scale(_lengths(source[inliers], reference[inliers], transform))
     return inliers, scale

@@ -17,10 +17,11 @@ _END_MODULE = re.compile(rb"\bENDMODULE\b", re.IGNORECASE)
 #: So much of a file without MODULE and ENDMODULE is read to see what it is.
 _SAMPLE = 16 * 1024
 #: Statements that other languages with `;` and `:=` hardly have.
-_TELLING = frozenset(
-    "module header data procedure end_procedure function end_function trap end_trap elseif end_if end_for end_while"
-    " end_test record end_record end_module if_ for_ while_".split()
-)
+_TELLING = {
+    *("module", "header", "data", "record", "end_record", "end_module", "elseif", "if_", "for_", "while_"),
+    *("procedure", "end_procedure", "function", "end_function", "trap", "end_trap"),
+    *("end_if", "end_for", "end_while", "end_test"),
+}
 _MOTION = re.compile(r"(?:Move|Spot|Arc|Trigg|Search)(?:Abs|Ext)?M?[LJC]\w*\b[^;]*,[^;]*,", re.IGNORECASE)
 
 
