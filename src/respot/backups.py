@@ -6,9 +6,11 @@ written. Paths that would leave the folder are refused.
 
 from __future__ import annotations
 
+import hashlib
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path, PurePosixPath
 
 from respot.issues import BadInputError, Issue
@@ -42,6 +44,16 @@ class Backup:
     files: Mapping[str, bytes]
     robots: Sequence[Robot]
     issues: Sequence[Issue]
+
+    @cached_property
+    def sha256(self) -> str:
+        """Hash of all paths and bytes."""
+        digest = hashlib.sha256()
+        for path in sorted(self.files):
+            data = self.files[path]
+            digest.update(f"{path}\0{len(data)}\0".encode())
+            digest.update(data)
+        return digest.hexdigest()
 
     def robot(self, name: str | None = None) -> Robot:
         """Return the one robot, or the robot of a name.

@@ -20,19 +20,39 @@ from respot.issues import BadInputError
 RECORD = "respot.json"
 
 
-def check_output(folder: Path, force: bool) -> None:
-    """Refuse an output folder that would lose something.
+def check_output(folder: Path, force: bool, source: Path | None = None) -> None:
+    """Refuse an output folder that would lose something: the source, or what is in it.
 
     Raises
     ------
     BadInputError
-        ``OUTPUT_EXISTS`` if it is a file, or holds anything and ``force`` is not given.
+        ``OUTPUT_EXISTS`` if it is a file, holds anything and ``force`` is not given, or is one with the source.
     """
+    if source is not None and _within(source, folder):
+        raise BadInputError(
+            "OUTPUT_EXISTS", f"holds the source {source} or lies in it; name another folder", str(folder)
+        )
     if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
         raise BadInputError("OUTPUT_EXISTS", "is not a folder; name another one with -o", str(folder))
     if folder.is_dir() and any(folder.iterdir()) and not force:
         message = "exists and is not empty; name another one with -o, or replace it with --force"
         raise BadInputError("OUTPUT_EXISTS", message, str(folder))
+
+
+def _within(source: Path, folder: Path) -> bool:
+    own, other = source.resolve(), folder.resolve()
+    return own == other or own in other.parents or other in own.parents
+
+
+def rehearse(files: Mapping[str, bytes], correction: Correction) -> None:
+    """Prove a correction without writing it.
+
+    Raises
+    ------
+    VerifyError
+        What would be written is not what is intended.
+    """
+    prove(correction, files, {**files, **correction.files})
 
 
 def write_backup(

@@ -1,19 +1,25 @@
-"""The weld spots of a source as arrays."""
+"""The weld spots of a source as arrays.
+
+A source is a backup (folder or zip), a program file, or a spot table.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from respot.backups import Backup, open_backup
 from respot.geometry import Array
 from respot.issues import BadInputError, Issue
+from respot.languages import LANGUAGES
 from respot.program.moves import Move
 from respot.program.robot import Robot
-from respot.tables import Table
+from respot.tables import Table, read_table
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +45,75 @@ class SpotTable:
     rotations: Rotation | None
     moves: Sequence[Move] = ()
     issues: Sequence[Issue] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """A source with its spots.
+
+    Parameters
+    ----------
+    path : Path
+        As the user named it.
+    spots : SpotTable
+        Its weld spots.
+    sha256 : str
+        Hash of what was read.
+    backup : Backup or None
+        None for a table.
+    robot : Robot or None
+        The robot of the backup that the spots are of.
+    """
+
+    path: Path
+    spots: SpotTable
+    sha256: str
+    backup: Backup | None = None
+    robot: Robot | None = None
+
+    @property
+    def issues(self) -> list[Issue]:
+        """What was noticed while reading."""
+        found = list(self.spots.issues)
+        if self.backup is not None:
+            found += self.backup.issues
+        if self.robot is not None:
+            found += self.robot.issues
+        return found
+
+
+def read_source(
+    path: Path, reference_ids: Collection[str] = (), spot_id: str | None = None, robot_name: str | None = None
+) -> Source:
+    """Read a source.
+
+    Parameters
+    ----------
+    path : Path
+        Backup, program file or table.
+    reference_ids : collection of str
+        IDs of the list it will be compared with, where that is known.
+    spot_id : str, optional
+        Regular expression for spot IDs.
+    robot_name : str, optional
+        Which robot of a backup with several.
+
+    Raises
+    ------
+    BadInputError
+        The source cannot be read, or it is not clear which robot is meant.
+    """
+    if not _is_backup(path):
+        table = read_table(path)
+        return Source(path, spots_of_table(table), table.sha256)
+    backup = open_backup(path)
+    robot = backup.robot(robot_name)
+    return Source(path, spots_of_robot(robot, reference_ids, spot_id), backup.sha256, backup, robot)
+
+
+def _is_backup(path: Path) -> bool:
+    suffixes = tuple(suffix for language in LANGUAGES.values() for suffix in language.suffixes)
+    return path.is_dir() or path.suffix.lower() == ".zip" or path.name.lower().endswith(suffixes)
 
 
 def spots_of_table(table: Table) -> SpotTable:

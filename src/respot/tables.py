@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -55,6 +56,8 @@ class Table:
         Line of each row, from 1.
     columns : mapping of str to sequence of str
         Every column as text, by its header in lower case.
+    sha256 : str
+        Hash of the table's text.
     """
 
     path: str
@@ -63,6 +66,7 @@ class Table:
     rotations: Rotation | None
     lines: Sequence[int]
     columns: Mapping[str, Sequence[str]]
+    sha256: str
 
 
 def read_table(path: Path) -> Table:
@@ -105,6 +109,7 @@ def read_table(path: Path) -> Table:
         rotations=_rotations(path, columns, numbers, delimiter),
         lines=numbers,
         columns=columns,
+        sha256=hashlib.sha256(text.encode()).hexdigest(),
     )
 
 

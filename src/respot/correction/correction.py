@@ -83,6 +83,8 @@ class Correction:
         Motions between moved and unmoved targets.
     files : mapping of str to bytes
         The changed files.
+    reconfigured : bool
+        Status/turn or confdata of all moved targets were computed anew; otherwise they were kept unchecked.
     issues : sequence of Issue
         What a person should know.
     """
@@ -97,6 +99,7 @@ class Correction:
     refused_programs: frozenset[str]
     transitions: Sequence[Transition]
     files: Mapping[str, bytes]
+    reconfigured: bool
     issues: Sequence[Issue]
 
     @property
@@ -157,6 +160,7 @@ def align(
         refused_programs=refused_programs,
         transitions=_transitions(scope, {id(item.target) for item in moving}, refused_programs),
         files=_changed_files(robot, language, options, edits, header),
+        reconfigured=configurator is not None and not any(item.code == "CONFIG_NOT_CHECKED" for item in refused),
         issues=_issues(robot, moving, spot_moves, edits),
     )
 

@@ -18,6 +18,7 @@ from typing import Generic, TypeVar
 
 from lark import Lark, Token, Tree
 from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
+from lark.grammar import Terminal
 
 from respot.program.statement import OPAQUE, Branch, Leaf, Lexicon, Shape
 from respot.resources import resource
@@ -128,14 +129,21 @@ class Shapes:
     @cached_property
     def lark(self) -> Lark:
         """The plain grammar; the reference against which the shapes are tested."""
-        text = resource("grammars", f"{self._grammar}.lark").read_text(encoding="utf-8")
-        return Lark(text, parser="lalr", start=[self._start, "file"], propagate_positions=True, maybe_placeholders=True)
+        return Lark(self._text, parser="lalr", start=[self._start, "file"], propagate_positions=True)
+
+    @cached_property
+    def _text(self) -> str:
+        return resource("grammars", f"{self._grammar}.lark").read_text(encoding="utf-8")
+
+    @cached_property
+    def _parser(self) -> _Parser:
+        return _Parser(self._text, self._start)
 
     @cached_property
     def keywords(self) -> frozenset[str]:
         """Every word, in lower case, that the grammar spells out."""
         words: set[str] = set()
-        for terminal in self.lark.terminals:
+        for terminal in self._parser.lark.terminals:
             if terminal.name not in ("NAME", "NUMBER", "STRING", "COMMENT", "BITS"):
                 words.update(word.lower() for word in re.findall(r"(?<![\\\w])[A-Za-z_]\w*", terminal.pattern.value))
         return frozenset(words)
@@ -228,35 +236,61 @@ class Shapes:
             return self.opaque(f"longer than {LONGEST_STATEMENT // 1024} kB")
         if _nesting(kinds) > DEEPEST_NESTING:
             return self.opaque(f"nested deeper than {DEEPEST_NESTING}")
-        starts = {start: position for position, (start, _) in enumerate(spans)}
         try:
-            tree = self.lark.parse(text, start=self._start)
+            branch = self._parser.parse(text, spans)
         except UnexpectedInput as error:
             fault = None if _at_end(error) else _covering(spans, error.pos_in_stream or 0)
-            reason = "ends too early" if _at_end(error) else f"{_described(kinds, fault)} is not expected here"
+            reason = "ends too early" if fault is None else f"{_described(kinds, fault)} is not expected here"
             return Shape(OPAQUE, None, reason, self._lexicon, kinds, fault)
-        branch = _branch(tree, starts, {end: position for position, (_, end) in enumerate(spans)})
         if branch is None:
             return self.opaque(f"a tree deeper than {DEEPEST_TREE}")
         return Shape(branch.kind, branch, "", self._lexicon, kinds)
 
 
-def _branch(tree: Tree[Token], starts: dict[int, int], ends: dict[int, int], depth: int = 0) -> Branch | None:
-    """Lay a tree over token positions; None if it is too deep to be walked by recursion."""
-    if depth > DEEPEST_TREE:
-        return None
-    children: list[Branch | Leaf] = []
-    for child in tree.children:
-        if isinstance(child, Tree):
-            below = _branch(child, starts, ends, depth + 1)
-            if below is None:
-                return None
-            children.append(below)
-        elif child is not None:
-            children.append(Leaf(starts[child.start_pos or 0], child.type))
-    if tree.meta.empty:
-        return Branch(str(tree.data), tuple(children), -1, -1)
-    return Branch(str(tree.data), tuple(children), starts[tree.meta.start_pos], ends[tree.meta.end_pos])
+class _Parser:
+    """The grammar, made to give trees over token positions quickly.
+
+    Lark's own propagation of positions costs more than the parsing. Here the tree keeps every token, so that first and
+    last of a rule are known, and those that the plain tree leaves out are dropped afterwards.
+    """
+
+    def __init__(self, grammar: str, start: str) -> None:
+        self.lark = Lark(grammar, parser="lalr", start=start, propagate_positions=False, keep_all_tokens=True)
+        terminals = [symbol for rule in self.lark.rules for symbol in rule.expansion if isinstance(symbol, Terminal)]
+        self._dropped = {terminal.name for terminal in terminals if terminal.filter_out}
+
+    def parse(self, text: str, spans: list[Span]) -> Branch | None:
+        """Tree of a statement; None if it is too deep to be walked by recursion.
+
+        Raises
+        ------
+        UnexpectedInput
+            The grammar does not know the statement.
+        """
+        positions = {start: position for position, (start, _) in enumerate(spans)}
+        return self._branch(self.lark.parse(text), positions, 0)
+
+    def _branch(self, tree: Tree[Token], positions: dict[int, int], depth: int) -> Branch | None:
+        if depth > DEEPEST_TREE:
+            return None
+        children: list[Branch | Leaf] = []
+        first = last = -1
+        for child in tree.children:
+            if isinstance(child, Tree):
+                below = self._branch(child, positions, depth + 1)
+                if below is None:
+                    return None
+                children.append(below)
+                begin, end = below.first, below.last
+            elif child is None:
+                continue
+            else:
+                begin = end = positions[child.start_pos or 0]
+                if child.type not in self._dropped:
+                    children.append(Leaf(begin, child.type))
+            first = begin if first < 0 else first
+            last = max(last, end)
+        return Branch(str(tree.data), tuple(children), first, last)
 
 
 def _nesting(kinds: tuple[str, ...]) -> int:

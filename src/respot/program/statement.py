@@ -18,8 +18,10 @@ from respot.source import Span
 
 #: Kind of a statement that no rule of the grammar knows.
 OPAQUE = "opaque"
-#: A statement of more tokens is searched token by token: its pattern would cost more than it saves.
+#: A statement of more tokens is searched token by token, and so are the first few statements of a shape: making a pattern
+#: costs as much as some hundred searches.
 _MOST_GROUPS = 500
+_RARE = 20
 
 
 class Leaf(NamedTuple):
@@ -140,14 +142,16 @@ class Shape:
         self.lexicon = lexicon
         self.kinds = kinds
         self.fault = fault
+        self._used = 0
         self._names: dict[tuple[str, ...], tuple[str, ...]] = {}
 
     def spans(self, text: str, start: int, end: int) -> list[Span]:
         """Spans of the tokens of a statement of this shape."""
-        if self._pattern is not None:
-            match = self._pattern.match(text, start, end)
+        if self._used > _RARE:
+            match = None if self._pattern is None else self._pattern.match(text, start, end)
             if match is not None:
                 return list(match.regs[1:])
+        self._used += 1
         found = self.lexicon.token.finditer(text, start, end)
         return [match.span() for match in found if match.lastindex is None]
 
@@ -156,7 +160,8 @@ class Shape:
         places = self._places
         if not places.numbers:
             return _NO_NUMBERS
-        match = None if self._number_pattern is None else self._number_pattern.match(text, start, end)
+        pattern = self._number_pattern if self._used > _RARE else None
+        match = None if pattern is None else pattern.match(text, start, end)
         if match is None:
             return self._numbers_by_token(text, start, end)
         groups = match.groups()

@@ -26,7 +26,7 @@ SCALE_FLOOR = 1e-3  # mm; a finer scale than a micrometre is printing, not noise
 _MEDIAN_CHI = float(stats.chi.median(3))
 _HUBER = float(stats.chi.ppf(0.90, 3))
 _TUKEY = 5.5
-_MANY_BAD = 0.6  # the consensus start is taken where its scale is below this share of the other's
+_MANY_BAD = 0.6  # the consensus start is taken where its scale is below this share of the other's (large tables)
 _SAMPLE = 20_000  # larger tables find their basin on an even sample of this size
 _TURNS = 30
 
@@ -94,7 +94,9 @@ def fit_robust(source: ArrayLike, reference: ArrayLike, *, seed: int = 0) -> Rob
     scale = robust_scale(_lengths(sample, target, transform))
     agreed = consensus_transform(sample, target, seed=seed)
     agreed_scale = _quota_scale(_lengths(sample, target, agreed))
-    if _inliers(sample, target, agreed, agreed_scale)[1] < _MANY_BAD * _inliers(sample, target, transform, scale)[1]:
+    quota = quota_of(len(sample))
+    clearly = _MANY_BAD * (1.0 - RIGID_PARAMETERS / (3.0 * quota)) ** 2  # few pairs agree closely by chance alone
+    if _inliers(sample, target, agreed, agreed_scale)[1] < clearly * _inliers(sample, target, transform, scale)[1]:
         start, transform, scale = "consensus", agreed, agreed_scale
     inliers, scale = _inliers(first, second, transform, scale)
     try:

@@ -58,6 +58,9 @@ _FIRST = (
     | _words("MODULE PROC FUNC TRAP RECORD ALIAS IF ELSEIF FOR WHILE TEST CASE DEFAULT ERROR CONST LOCAL TASK")
 )
 _FIRST_IN_SIMPLE = _FIRST | _STORAGE
+#: Two names may follow these: a type and what is of it.
+_BEFORE_TYPE = _STORAGE | {"ALIAS"}
+_BEFORE_PARAMETER = _STORAGE | {"(", ",", "\\", "|", "INOUT"}
 #: Reserved words within a statement: the next line goes on with it.
 _WITHIN = _words("AND OR XOR NOT DIV MOD THEN DO FROM TO STEP WITH INOUT")
 _OPEN, _CLOSE = "([{", ")]}"
@@ -192,6 +195,8 @@ _TWO_OPERANDS = re.compile(
     re.IGNORECASE,
 )
 _ASSIGNS = re.compile(r"[^\W\d]\w*(?:\s*\{[^}]*\}|\s*\.\s*[^\W\d]\w*)*\s*:=", re.IGNORECASE)
+#: Characters that hold the type and the name of a parameter.
+_LONGEST_PARAMETER = 400
 #: Tries at closing one head; more are only met in a file made to stall the reader.
 _MOST_TRIES = 50
 
@@ -209,8 +214,8 @@ class _Begun:
         self.stop = stop
         #: its first words in upper case, modifiers left out
         self.words = words
-        #: a compact IF has taken its statement
-        self.joined = False
+        #: begin of the line with the statement of a compact IF
+        self.joined: int | None = None
         self.tries = 0
         #: comment lines since its last line with code
         self.comments: list[Statement] = []
@@ -352,37 +357,45 @@ class _Reader:
     def _begins(self, begun: _Begun, line: str, start: int) -> bool:
         """Whether a line begins a statement although the one before it has not ended."""
         found = _WORD.match(line)
-        if found is None:
+        if found is None or not begun.words:
             return False
         word = found.group().upper()
-        compact = begun.words[:1] == ("IF",) and not begun.joined
-        if word in _WITHIN or not begun.words:
+        compact = begun.words[0] == "IF" and begun.joined is None
+        if word in _WITHIN:
             return False
+        if begun.words[0] in _HEADS and word not in _FIRST:
+            return self._leaves_head(begun)
         if word in _FIRST_IN_SIMPLE:
-            if word in _STORAGE and begun.words[0] in _HEADS:
-                return _is_operand(self._last_kind(begun))
             if compact and word in _JUMPS:
-                begun.joined = True
+                begun.joined = start
                 return False
             return True
-        before = self._last_kind(begun)
+        kinds = self._last_kinds(begun)
+        before = kinds[-1]
         if not _is_operand(before):
-            if compact or begun.words[0] in _HEADS:
-                return False
-            if _TWO_OPERANDS.match(line):
-                return True
-            return before not in (",", "\\") and _ASSIGNS.match(line) is not None
+            return not compact and before not in _BEFORE_TYPE and _begins_anyway(line, before)
         if compact:
-            begun.joined = True
+            begun.joined = start
             return False
-        if len(begun.words) == 1 and begun.last == begun.start:
+        if begun.words[0] in _BEFORE_TYPE and len(begun.words) == 2:
+            return False
+        if begun.last in (begun.start, begun.joined) and len(kinds) == 1:
             # a procedure without arguments and no `;`, or one whose arguments stand in the next line: further right
-            return self._column(start) <= self._column(begun.start)
-        return not (begun.words[0] in _STORAGE and len(begun.words) == 2)
+            return self._column(start) <= self._column(begun.last)
+        return True
 
-    def _last_kind(self, begun: _Begun) -> str:
+    def _leaves_head(self, begun: _Begun) -> bool:
+        """Whether a word after the lines of a routine head that was begun is none of its parameters."""
+        text = self._text[max(begun.start, begun.stop - _LONGEST_PARAMETER) : begun.stop]
+        kinds = SHAPES.kinds(text)[0]
+        if len(kinds) < 2 or not _is_operand(kinds[-1]) or self._text.find("(", begun.start, begun.stop) < 0:
+            return False
+        return kinds[-2] not in _BEFORE_PARAMETER
+
+    def _last_kinds(self, begun: _Begun) -> list[str]:
+        """Kinds of the tokens of the last line of a statement that goes on."""
         begin = max(begun.last, begun.stop - LONGEST_STATEMENT)
-        return SHAPES.kinds(self._text[begin : begun.stop])[0][-1]
+        return SHAPES.kinds(self._text[begin : begun.stop])[0]
 
     def _column(self, start: int) -> int:
         return start - self._line_starts[bisect_right(self._line_starts, start) - 1]
@@ -439,6 +452,13 @@ def _is_operand(kind: str) -> bool:
     if kind[0].isalpha():
         return kind not in _FIRST_IN_SIMPLE and kind not in _WITHIN
     return kind in ("0", '"', ")", "]", "}") or (kind[0] == "<" and len(kind) > 2)
+
+
+def _begins_anyway(line: str, before: str) -> bool:
+    """Whether a line begins a statement although an operand is missing in the one before it."""
+    if _TWO_OPERANDS.match(line):
+        return True
+    return before not in (",", "(", "\\", "%") and _ASSIGNS.match(line) is not None
 
 
 def _holds_end(begun: _Begun, kinds: list[str]) -> bool:

@@ -1,0 +1,128 @@
+"""``respot convert``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from respot.cli import options
+from respot.cli.fit import reference_of
+from respot.cli.outcome import Outcome
+from respot.cli.outcome import run as run_command
+from respot.issues import BadInputError
+
+if TYPE_CHECKING:
+    from respot.calibration.source_fit import FitOptions
+    from respot.correction.options import CorrectionOptions
+
+HELP = "Write the programs of a backup corrected: proved, reversible, in a new folder."
+
+
+def run(
+    source: options.Source,
+    theory: options.Theory = None,
+    measured: options.Measured = None,
+    calibration: Annotated[
+        Path | None, typer.Option("-c", "--calibration", help="A calibration that fit saved.", show_default=False)
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="New folder for the backup.", show_default=False)
+    ] = None,
+    frame: options.FrameOption = None,
+    robot_name: options.RobotName = None,
+    spot_id: options.SpotId = None,
+    noise: options.Noise = None,
+    programs: Annotated[
+        str | None, typer.Option("--programs", help="Glob of the programs in scope.", show_default=False)
+    ] = None,
+    max_shift: Annotated[str, typer.Option("--max-shift", help="No target moves further: MM[,DEG].")] = "150,5",
+    keep_config: Annotated[
+        bool, typer.Option("--keep-config", help="Keep status/turn and confdata that cannot be computed.")
+    ] = False,
+    partial: Annotated[
+        bool, typer.Option("--partial", help="Correct what can be corrected of a refused program.")
+    ] = False,
+    templates: Annotated[
+        Path | None, typer.Option("--templates", help="Folder of templates laid over ours.", show_default=False)
+    ] = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Do everything but write.")] = False,
+    tolerance: options.Tolerance = 10.0,
+    seed: options.Seed = 0,
+    force: options.Force = False,
+    as_json: options.AsJson = False,
+    strict: options.Strict = False,
+) -> None:
+    """Run the command."""
+
+    def work() -> Outcome:
+        from respot.correction.options import CorrectionOptions
+
+        chosen = CorrectionOptions(programs, shift_limits(max_shift), keep_config, partial, templates)
+        if calibration is not None:
+            if theory or measured:
+                raise BadInputError("BAD_OPTION", "give either -c CAL.json or a reference to fit to, not both")
+            from respot.calibration.source_fit import FitOptions
+
+            fit_options, reference = FitOptions(robot_name=robot_name, spot_id=spot_id), None
+        else:
+            reference, fit_options = reference_of(theory, measured, frame, robot_name, spot_id, noise, seed)
+        return convert_to(source, reference, calibration, fit_options, chosen, output, dry_run, force, tolerance)
+
+    run_command(work, as_json, strict)
+
+
+def convert_to(
+    source: Path,
+    reference: Path | None,
+    calibration: Path | None,
+    fit_options: FitOptions,
+    chosen: CorrectionOptions,
+    output: Path | None,
+    dry_run: bool,
+    force: bool,
+    tolerance: float,
+) -> Outcome:
+    """Convert and write, unless it is a dry run."""
+    from respot.cli.show_convert import show_conversion
+    from respot.correction.conversion import convert, record_of
+    from respot.output import check_output, rehearse, write_backup
+
+    if output is None and not dry_run:
+        raise BadInputError("BAD_OPTION", "give the new folder with -o OUTDIR, or --dry-run")
+    if output is not None:
+        check_output(output, force, source)
+    conversion = convert(source, reference, calibration, fit_options, chosen)
+    if dry_run or output is None:
+        rehearse(conversion.files, conversion.correction)
+    else:
+        write_backup(output, conversion.files, conversion.correction, record_of(conversion), force)
+    written = None if dry_run else output
+    data = {**conversion.as_json(), "verified": True, "output": None if written is None else str(written)}
+    return Outcome(
+        "convert",
+        data,
+        lambda: show_conversion(conversion, tolerance, written),
+        list(conversion.issues),
+        answer_is_no=bool(conversion.correction.refused),
+    )
+
+
+def shift_limits(text: str) -> tuple[float, float]:
+    """Read ``MM[,DEG]``.
+
+    Raises
+    ------
+    BadInputError
+        The text is not one or two positive numbers.
+    """
+    from respot.correction.options import ALIGN_MAX_SHIFT
+
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (1, 2) or not all(0.0 <= number < float("inf") for number in numbers):
+        raise BadInputError("BAD_OPTION", f"--max-shift is MM or MM,DEG, not {text!r}")
+    return numbers[0], numbers[1] if len(numbers) == 2 else ALIGN_MAX_SHIFT[1]

@@ -1,0 +1,76 @@
+"""Tables and lines for people: rich on a terminal, plain text when piped."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import typer
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table: its title, and whether it holds numbers."""
+
+    title: str
+    number: bool = True
+
+
+def is_terminal() -> bool:
+    """Whether stdout is a terminal."""
+    return sys.stdout.isatty()
+
+
+def terminal_width() -> int:
+    """Width of the terminal; without limit when piped."""
+    if not is_terminal():
+        return 10_000
+    from rich.console import Console
+
+    return Console().width
+
+
+def heading(text: str) -> None:
+    """Print a heading."""
+    typer.echo()
+    typer.secho(text, bold=True)
+
+
+def line(text: str = "") -> None:
+    """Print a line."""
+    typer.echo(text)
+
+
+def table(columns: Sequence[Column], rows: Sequence[Sequence[str]], marked: Sequence[bool] = ()) -> None:
+    """Print a table; marked rows stand out on a terminal."""
+    if is_terminal():
+        _rich(columns, rows, marked)
+    else:
+        _plain(columns, rows)
+
+
+def _plain(columns: Sequence[Column], rows: Sequence[Sequence[str]]) -> None:
+    cells = [[column.title for column in columns], *rows]
+    widths = [max(len(row[index]) for row in cells) for index in range(len(columns))]
+    for row in cells:
+        parts = [
+            cell.rjust(width) if column.number else cell.ljust(width)
+            for cell, width, column in zip(row, widths, columns, strict=True)
+        ]
+        typer.echo("  ".join(parts).rstrip())
+
+
+def _rich(columns: Sequence[Column], rows: Sequence[Sequence[str]], marked: Sequence[bool]) -> None:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    made = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for column in columns:
+        made.add_column(column.title, justify="right" if column.number else "left", no_wrap=True)
+    for index, row in enumerate(rows):
+        style = "yellow" if index < len(marked) and marked[index] else ""
+        made.add_row(*(Text(cell, style=style) for cell in row))
+    Console().print(made)

@@ -1,0 +1,46 @@
+"""Arguments and options that commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+Source = Annotated[
+    Path, typer.Argument(help="Backup (folder or zip), program file, or spot table.", show_default=False)
+]
+Theory = Annotated[
+    Path | None,
+    typer.Option(
+        "--theory", help="Where the spots should be: simulation or CAD, same coordinate system.", show_default=False
+    ),
+]
+Measured = Annotated[
+    Path | None,
+    typer.Option(
+        "--measured", help="Where the robot really went: tracker, CMM; any coordinate system.", show_default=False
+    ),
+]
+FrameOption = Annotated[
+    str | None,
+    typer.Option(
+        "--frame", help="same or free: whether both coordinate systems claim to be the same.", show_default=False
+    ),
+]
+RobotName = Annotated[
+    str | None, typer.Option("--robot-name", help="Which robot of a backup with several.", show_default=False)
+]
+SpotId = Annotated[
+    str | None,
+    typer.Option("--spot-id", help="Regular expression for the spot ID in a target's name.", show_default=False),
+]
+Noise = Annotated[
+    float | None,
+    typer.Option("--noise", min=0.0, help="Known noise of the reference per coordinate, mm.", show_default=False),
+]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything that is drawn.")]
+Tolerance = Annotated[float, typer.Option("--tolerance", min=0.0, help="Tolerance of a spot, mm.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+Strict = Annotated[bool, typer.Option("--strict", help="Exit 1 if there is an issue of level error.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace an output folder that is not empty.")]

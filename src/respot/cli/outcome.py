@@ -1,0 +1,107 @@
+"""One object owns what a command says and the code it exits with.
+
+Exit codes: 0 done; 1 the answer is no, or ``--strict`` and an issue of level error; 2 bad usage or input, nothing written;
+3 internal error; 130 interrupted. Data go to stdout, words to stderr.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+import traceback
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import typer
+
+from respot import __version__
+from respot.issues import BadInputError, Issue, Level, has_errors
+
+DONE, NO, BAD_INPUT, INTERNAL, INTERRUPTED = 0, 1, 2, 3, 130
+#: Issues of one code that are written in full; the rest are counted.
+_MOST_OF_A_CODE = 10
+
+
+@dataclass
+class Outcome:
+    """What a command found.
+
+    Parameters
+    ----------
+    command : str
+        Name of the command, for the schema.
+    data : mapping
+        The JSON record without schema, version and issues.
+    show : callable
+        Prints the result for people on stdout.
+    issues : list of Issue
+        What a person should know.
+    answer_is_no : bool
+        Exit code 1.
+    """
+
+    command: str
+    data: Mapping[str, Any]
+    show: Callable[[], None]
+    issues: list[Issue] = field(default_factory=list)
+    answer_is_no: bool = False
+
+    def emit(self, as_json: bool, strict: bool) -> None:
+        """Print, and exit with the right code."""
+        if as_json:
+            record = {
+                "schema": f"respot.{self.command}/1",
+                "version": __version__,
+                "issues": [issue.as_json() for issue in self.issues],
+                **self.data,
+            }
+            typer.echo(json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False))
+        else:
+            self.show()
+            say(self.issues)
+        if self.answer_is_no or (strict and has_errors(self.issues)):
+            raise typer.Exit(NO)
+
+
+def say(issues: Iterable[Issue]) -> None:
+    """Write issues to stderr, the serious ones first; many of one code are cut short."""
+    order = [Level.ERROR, Level.WARNING, Level.INFO]
+    by_code: dict[str, list[Issue]] = {}
+    for issue in sorted(issues, key=lambda issue: order.index(issue.level)):
+        by_code.setdefault(issue.code, []).append(issue)
+    for same in by_code.values():
+        for issue in same[:_MOST_OF_A_CODE]:
+            colour = {Level.ERROR: typer.colors.RED, Level.WARNING: typer.colors.YELLOW, Level.INFO: None}[issue.level]
+            typer.secho(f"{issue.level}: {issue}", err=True, fg=colour)
+        if len(same) > _MOST_OF_A_CODE:
+            typer.echo(f"... and {len(same) - _MOST_OF_A_CODE} more {same[0].code}", err=True)
+
+
+def run(make: Callable[[], Outcome], as_json: bool = False, strict: bool = False) -> None:
+    """Run a command's work and turn every way it can end into words and an exit code."""
+    try:
+        outcome = make()
+    except BadInputError as error:
+        typer.secho(f"error: {error.issue}", err=True, fg=typer.colors.RED)
+        raise typer.Exit(BAD_INPUT) from None
+    except KeyboardInterrupt:
+        typer.echo("interrupted: nothing was left half-written", err=True)
+        raise typer.Exit(INTERRUPTED) from None
+    except Exception as error:
+        typer.secho(
+            f"internal error: {error}\nThe details are in {_log()}; please report it.", err=True, fg=typer.colors.RED
+        )
+        raise typer.Exit(INTERNAL) from None
+    try:
+        outcome.emit(as_json, strict)
+        sys.stdout.flush()
+    except BrokenPipeError:  # the reader, such as `head`, has seen enough
+        sys.stdout = None
+
+
+def _log() -> str:
+    with tempfile.NamedTemporaryFile("w", prefix="respot-", suffix=".log", delete=False, encoding="utf-8") as file:
+        file.write(f"respot {__version__}, Python {sys.version}\n{' '.join(sys.argv)}\n\n{traceback.format_exc()}")
+    return file.name

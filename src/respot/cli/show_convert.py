@@ -1,0 +1,57 @@
+"""A conversion on the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from respot.cli.display import Column, heading, line, table
+from respot.cli.show_fit import describe, show_fit
+from respot.issues import CODES
+
+if TYPE_CHECKING:
+    from respot.correction.conversion import Conversion
+
+
+def show_conversion(conversion: Conversion, tolerance: float, written: Path | None) -> None:
+    """Print a conversion: the fit, what moved, what stays, what was refused, where it is."""
+    if conversion.fitted is not None:
+        show_fit(conversion.fitted, tolerance)
+    correction = conversion.correction
+    heading(f"{describe(conversion.source)}: {'written' if written else 'nothing written (dry run)'}")
+    _show_moved(conversion)
+    for code in dict.fromkeys(stay.code for stay in correction.stays):
+        names = [stay.target.name for stay in correction.stays if stay.code == code]
+        line(f"  stay, {CODES[code][1].removesuffix('; it stays')}: {_some(names)}")
+    for item in correction.transitions:
+        line(f"  changed path, step through it: {item.start} -> {item.end} in {item.program} ({item.path}:{item.line})")
+    for program in sorted(correction.refused_programs):
+        line(f"  REFUSED, left as it was: program {program}")
+    line("  status/turn and confdata: " + ("recomputed" if correction.reconfigured else "kept, NOT checked"))
+    line("  read back and compared with what was intended: equal; every other byte is as it was")
+    line("  for the cell as simulated: the real old cell must never load these files")
+    if written is not None:
+        line(f"  in {written} (record: {written / 'respot.json'})")
+
+
+def _show_moved(conversion: Conversion) -> None:
+    programs: dict[str, list[float]] = {}
+    for edit in conversion.correction.edits:
+        programs.setdefault(edit.path, []).append(edit.shift_mm if edit.edit.reason == "point" else -1.0)
+    rows = []
+    for path, shifts in programs.items():
+        moved = [shift for shift in shifts if shift >= 0.0]
+        spread = f"{min(moved):.2f} .. {max(moved):.2f}" if moved else "-"
+        rows.append([path, str(len(moved)), str(len(shifts) - len(moved)), spread])
+    if rows:
+        columns = [Column("file", number=False), Column("targets"), Column("offsets"), Column("moved by [mm]")]
+        table(columns, rows)
+    else:
+        line("  no target moves: every file is as it was")
+
+
+def _some(names: Iterable[str], most: int = 8) -> str:
+    unique = list(dict.fromkeys(names))
+    more = f" and {len(unique) - most} more" if len(unique) > most else ""
+    return ", ".join(unique[:most]) + more

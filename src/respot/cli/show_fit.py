@@ -1,0 +1,132 @@
+"""A fit on the terminal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from respot.cli.display import Column, heading, line, table, terminal_width
+from respot.languages import LANGUAGES
+
+if TYPE_CHECKING:
+    from respot.calibration.fit import SpotFit
+    from respot.calibration.source_fit import SourceFit
+    from respot.geometry import Array
+    from respot.spots import Source
+
+#: The table of spots needs this width to show coordinates.
+_WIDE = 124
+
+
+def show_fit(fitted: SourceFit, tolerance: float, saved: Path | None = None) -> None:
+    """Print a fit: spots, errors, transform, what was found."""
+    fit = fitted.fit
+    kind = "should be" if fit.calibration.kind == "theory" else "really went"
+    heading(f"{describe(fitted.source)} against {fitted.reference.path} (where it {kind})")
+    counts = f"{len(fitted.source.spots.ids)} spots in the source, {len(fitted.reference.spots.ids)} in the reference"
+    line(f"{counts}, {len(fit.ids)} matched by ID, {int(fit.robust.inliers.sum())} inliers")
+    line()
+    _show_spots(fit)
+    _show_errors(fit, tolerance)
+    _show_transform(fit)
+    _show_found(fit)
+    if saved is not None:
+        line(f"\nsaved {saved}")
+
+
+def describe(source: Source) -> str:
+    """Name a source: the robot with its language and model, or the table."""
+    robot = source.robot
+    if robot is None:
+        return str(source.path)
+    model = f", {robot.machine.model}" if robot.machine.model else ""
+    return f"{robot.name} ({LANGUAGES[robot.language].title}{model})"
+
+
+def _show_spots(fit: SpotFit) -> None:
+    wide = terminal_width() >= _WIDE
+    calibrated, as_found = fit.calibrated, np.linalg.norm(fit.as_found, axis=1)
+    after = np.linalg.norm(fit.robust.rigid.residuals, axis=1)
+    columns = [Column("spot", number=False)]
+    columns += [Column("theoretical x, y, z" if fit.calibration.kind == "theory" else "measured x, y, z")] * wide
+    columns += [Column("actual x, y, z")] * wide + [Column("as found")]
+    columns += [Column("calibrated x, y, z")] * wide
+    columns += [Column(title) for title in ("after", "dx", "dy", "dz")] + [Column("inlier", number=False)]
+    rows = []
+    for row, name in enumerate(fit.ids):
+        cells = [f"{name} *" if fit.repaired[row] else name]
+        cells += [_point(fit.reference[row]), _point(fit.source[row])] * 1 if wide else []
+        cells += [f"{as_found[row]:.2f}"]
+        cells += [_point(calibrated[row])] if wide else []
+        cells += [f"{after[row]:.2f}", *(f"{value:+.2f}" for value in fit.robust.rigid.residuals[row])]
+        cells += ["yes" if fit.robust.inliers[row] else "no"]
+        rows.append(cells)
+    table(columns, rows, marked=[bool(value) for value in fit.repaired])
+    for name, other in zip(fit.ids, fit.reference_ids, strict=True):
+        if name != other:
+            line(f"* {name} lies at the place that the reference calls {other}; 'as found' takes the names as given")
+
+
+def _point(point: Array) -> str:
+    return " ".join(f"{value:8.2f}" for value in point)
+
+
+def _show_errors(fit: SpotFit, tolerance: float) -> None:
+    heading("errors [mm]")
+    rigid, inliers = fit.robust.rigid.residuals, fit.robust.inliers
+    kept = "names exchanged back" if fit.repaired.any() else "names as given"
+    rows = [
+        _errors("as found, no transform", fit.as_found),
+        _errors("before: rigid, all spots, names as given", fit.before.residuals),
+        _errors(f"after: rigid, {int(inliers.sum())} inliers, {kept}", rigid[inliers]),
+        _errors("leave-one-out before", fit.before_loo),
+        _errors("leave-one-out after", fit.after_loo),
+        _errors("for comparison: translation alone", fit.translation.residuals),
+    ]
+    if fit.affine is not None:
+        rows.append(_errors("for comparison: 12 free parameters, names as given", fit.affine.residuals))
+    table([Column("", number=False), Column("RMS"), Column("mean"), Column("max"), Column("n")], rows)
+    within = int((np.linalg.norm(rigid, axis=1) <= tolerance).sum())
+    line(f"{within} of {len(fit.ids)} spots within {tolerance:g} mm after")
+
+
+def _errors(title: str, vectors: Array) -> list[str]:
+    lengths = np.linalg.norm(vectors, axis=1)
+    if not np.isfinite(lengths).all():
+        return [title, "-", "-", "-", str(len(lengths))]
+    root = float(np.sqrt((lengths**2).mean()))
+    return [title, f"{root:.3f}", f"{lengths.mean():.3f}", f"{lengths.max():.3f}", str(len(lengths))]
+
+
+def _show_transform(fit: SpotFit) -> None:
+    heading("transform, source to reference (95 % intervals)")
+    inliers = fit.robust.inliers
+    moved = (fit.calibrated[inliers] - fit.source[inliers]).mean(axis=0)
+    turned = np.degrees(fit.calibration.source2reference.rotation.as_rotvec())
+    half = fit.uncertainty.half_width
+    for name, value, width in zip("xyz", moved, half[:3], strict=True):
+        line(f"  the spots' centre moves in {name} by {value:8.3f} +- {width:.3f} mm")
+    for name, value, width in zip("xyz", turned, half[3:], strict=True):
+        line(f"  it turns about {name}         by {value:8.4f} +- {width:.4f} degrees")
+    sure = "" if fit.support.supported else "NOT supported: "
+    line(f"  rotation {sure}{fit.support.verdict}")
+
+
+def _show_found(fit: SpotFit) -> None:
+    heading("what is left, and why")
+    for effect in fit.effects:
+        word = "named" if effect.named else "consistent with"
+        line(f"  {effect.name} ({word}): {effect.remedy.text}")
+    if not fit.effects:
+        line("  no effect found beyond the rigid transform")
+    sd = fit.directions.sd_xyz
+    axis = fit.directions.axes[int(np.argmax(fit.directions.sd))]
+    along = "xyz"[int(np.argmax(np.abs(axis)))]
+    line(
+        f"  residuals spread {sd[0]:.1f} / {sd[1]:.1f} / {sd[2]:.1f} mm in x / y / z: "
+        f"mostly along {along}; a spread along one direction of the part is how people space spots by hand"
+        if sd.max() > 2.0 * np.sort(sd)[1]
+        else f"  residuals spread {sd[0]:.1f} / {sd[1]:.1f} / {sd[2]:.1f} mm in x / y / z, alike in all directions"
+    )

@@ -1,0 +1,183 @@
+"""A backup in, a corrected backup out: the function behind `respot convert`."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from respot import __version__
+from respot.calibration.calibration import Calibration, CalibrationError
+from respot.calibration.source_fit import FitOptions, SourceFit, fit_source
+from respot.correction.configuration import configurator_of
+from respot.correction.correction import Correction, align
+from respot.correction.options import CorrectionOptions
+from respot.issues import BadInputError, Issue
+from respot.program.moves import Move
+from respot.program.robot import Robot
+from respot.spots import Source, read_source
+
+
+@dataclass(frozen=True, eq=False)
+class Conversion:
+    """What a conversion is going to write.
+
+    Parameters
+    ----------
+    source : Source
+        The backup.
+    calibration : Calibration
+        The model.
+    fitted : SourceFit or None
+        The fit it comes from; None where it was loaded.
+    correction : Correction
+        Edits, refusals, changed files.
+    issues : sequence of Issue
+        Everything noticed.
+    """
+
+    source: Source
+    calibration: Calibration
+    fitted: SourceFit | None
+    correction: Correction
+    issues: Sequence[Issue]
+
+    @property
+    def robot(self) -> Robot:
+        """The robot that is converted."""
+        return self.correction.robot
+
+    @property
+    def files(self) -> dict[str, bytes]:
+        """Files of the robot as they were; of a backup with several robots only its own."""
+        backup = self.source.backup
+        assert backup is not None  # noqa: S101 - a conversion is made of a backup
+        return {path: data for path, data in backup.files.items() if path.startswith(self.robot.root)}
+
+    def as_json(self) -> dict[str, Any]:
+        """Record of INTERFACES.md, `convert`, without schema, version and issues."""
+        correction = self.correction
+        record: dict[str, Any] = {
+            "direction": correction.direction,
+            "robot": {"name": self.robot.name, "language": self.robot.language, "model": self.robot.machine.model},
+            "calibration": {"hash": self.calibration.content_hash, "kind": self.calibration.kind},
+            "edits": [
+                {
+                    "path": edit.path,
+                    "line": edit.line,
+                    "target": edit.target,
+                    "depth": "point",
+                    "reason": edit.edit.reason,
+                    "before": edit.before,
+                    "after": edit.after,
+                    "shift_mm": edit.shift_mm,
+                    "turn_deg": edit.turn_deg,
+                }
+                for edit in correction.edits
+            ],
+            "unmoved": [
+                {"target": stay.target.name, "code": stay.code, "path": stay.target.path, "line": stay.target.line}
+                for stay in correction.stays
+            ],
+            "transitions": [
+                {"from": item.start, "to": item.end, "program": item.program, "path": item.path, "line": item.line}
+                for item in correction.transitions
+            ],
+            "refused": [
+                {"program": refusal.program, "target": refusal.target, "code": refusal.code, "message": refusal.message}
+                for refusal in correction.refused
+            ],
+        }
+        if self.fitted is not None:
+            record["fit"] = self.fitted.fit.to_dict()
+        return record
+
+
+def convert(
+    source: Path,
+    reference: Path | None,
+    calibration: Path | None,
+    fit_options: FitOptions,
+    options: CorrectionOptions,
+) -> Conversion:
+    """Plan a conversion: fit or load the model, and correct every target in scope.
+
+    Parameters
+    ----------
+    source : Path
+        A backup or program.
+    reference : Path or None
+        What to fit to; None where ``calibration`` is given.
+    calibration : Path or None
+        A saved calibration.
+    fit_options, options :
+        What a person decided.
+
+    Raises
+    ------
+    BadInputError
+        Anything that makes a correct conversion impossible as a whole.
+    """
+    if reference is not None:
+        fitted = fit_source(source, reference, fit_options)
+        model, read, issues = fitted.fit.calibration, fitted.source, list(fitted.issues)
+        ids: Sequence[str] = fitted.fit.ids
+    else:
+        assert calibration is not None  # noqa: S101 - the command line asks for one of both
+        fitted, model = None, _load(calibration)
+        read = read_source(source, model.ids, fit_options.spot_id, fit_options.robot_name)
+        issues, ids = read.issues, model.ids
+    if read.robot is None:
+        raise BadInputError("NO_ROBOT", "is a table: only a backup or a program can be converted", str(source))
+    if model.kind != "theory":
+        message = (
+            "a measured reference without effects registers two coordinate systems and has nothing to compensate; "
+            "to move programs onto another list of spots, give it with --theory"
+        )
+        raise BadInputError("BAD_OPTION", message)
+    moves = _moves_of(read, ids)
+    if not moves:
+        raise BadInputError("NO_COMMON_IDS", "holds none of the spots that the calibration was fitted to", str(source))
+    correction = align(
+        read.robot, model.source2reference, model.content_hash, moves, options, configurator_of(read.robot)
+    )
+    refused = [
+        Issue(refusal.code, f"{refusal.target}: {refusal.message}", refusal.path, refusal.line)
+        for refusal in correction.refused
+    ]
+    return Conversion(read, model, fitted, correction, [*issues, *refused, *correction.issues])
+
+
+def _moves_of(source: Source, ids: Sequence[str]) -> list[Move]:
+    wanted = set(ids)
+    return [move for name, move in zip(source.spots.ids, source.spots.moves, strict=True) if name in wanted]
+
+
+def _load(path: Path) -> Calibration:
+    try:
+        return Calibration.load(path)
+    except CalibrationError as error:
+        raise BadInputError("BAD_CALIBRATION", str(error).removeprefix(f"{path}: "), str(path)) from error
+
+
+def record_of(conversion: Conversion) -> dict[str, Any]:
+    """What ``respot.json`` holds: what was applied to what, so that a reader can check and never apply it twice."""
+    correction, files = conversion.correction, conversion.files
+    return {
+        "schema": "respot.convert/1",
+        "version": __version__,
+        "source": str(conversion.source.path),
+        "source_sha256": conversion.source.sha256,
+        "verified": True,
+        "issues": [issue.as_json() for issue in conversion.issues],
+        "files": {
+            path: {"before": _sha256(files[path]), "after": _sha256(data)} for path, data in correction.files.items()
+        },
+        **conversion.as_json(),
+    }
+
+
+def _sha256(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()

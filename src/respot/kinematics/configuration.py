@@ -1,0 +1,263 @@
+"""Status and turn, or confdata, of moved targets.
+
+The old numbers and the old pose define the joints of the taught point. The moved point gets the joint solution
+nearest to them, full turns included, and its numbers follow from that. Nothing is guessed: a taught point whose
+numbers fit none of its solutions, a solution outside the limits, a pose out of reach are reasons, not answers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial.transform import RigidTransform
+
+from respot.geometry import Array
+from respot.kinematics import confdata, status_turn
+from respot.kinematics.cell import Reason, RobotCell
+from respot.kinematics.opw import OpwRobot
+from respot.kinematics.turns import TURNS, chosen_turn, nearest_turn, outside
+
+Integers = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
+
+#: A moved angle this near to a border keeps the old number if that is the one on the other side [deg; mm].
+KEEP = 1e-6
+#: Taught points are printed with few digits: their joints may lie so far beyond a border of the old numbers [deg; mm].
+TAUGHT = 0.02
+#: The nominal joints of an absolutely accurate robot are not its joints; within this of a border they decide nothing.
+ACCURATE = 0.5
+
+
+class Scheme(Protocol):
+    """What a language's module offers: `respot.kinematics.status_turn`, `respot.kinematics.confdata`."""
+
+    def posture_matches(self, model: OpwRobot, joints: Array, old: Integers, tolerance: float) -> Bools:
+        """Whether solutions have the old branch."""
+
+    def turn_matches(self, joints: Array, old: Integers, tolerance: float) -> Bools:
+        """Whether angles plus full turns have the old turns."""
+
+    def undefined(self, old: Integers) -> Bools:
+        """Whether the old numbers are no such numbers."""
+
+    def margins(self, model: OpwRobot, joints: Array) -> Array:
+        """Distances from the borders."""
+
+    def text(self, configuration: npt.ArrayLike) -> str:
+        """As people write it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reconfiguration:
+    """Configuration of n moved targets.
+
+    Parameters
+    ----------
+    configuration : ndarray of int
+        ``S, T`` (n, 2) or ``cf1, cf4, cf6, cfx`` (n, 4); where there is a reason, the old numbers.
+    joints : Array
+        Joints of the moved targets, shape (n, 6), degrees; NaN where there is a reason that leaves none.
+    old_joints : Array
+        Joints of the taught points, shape (n, 6); NaN where none fits.
+    reasons : tuple of (Reason or None)
+        Why a target has no valid configuration; None where it has.
+    """
+
+    configuration: Integers
+    joints: Array
+    old_joints: Array
+    reasons: tuple[Reason | None, ...]
+
+    @property
+    def valid(self) -> Bools:
+        """Whether each target has a configuration."""
+        return np.array([reason is None for reason in self.reasons], dtype=bool)
+
+
+def configuration_of(cell: RobotCell, joints: npt.ArrayLike, previous: npt.ArrayLike | None = None) -> Integers:
+    """Status and turn (n, 2), or confdata (n, 4), of joints (n, 6) [deg]; ``previous`` as in `status_turn`, `confdata`.
+
+    Raises
+    ------
+    ValueError
+        The robot has no spherical wrist, or a joint is not finite.
+    """
+    if not isinstance(cell.model, OpwRobot):
+        raise ValueError(f"status, turn and confdata are not defined for {cell.model.name or 'this robot'}")
+    angles = np.atleast_2d(np.asarray(joints, dtype=float))
+    if not np.isfinite(angles).all():
+        raise ValueError("a joint is not finite")
+    write = status_turn.status_turn if cell.language == "krl" else confdata.confdata
+    return write(cell.model, angles, previous, KEEP)
+
+
+def taught_joints(
+    cell: RobotCell, tool2flange: RigidTransform, tool2world: RigidTransform, configuration: npt.ArrayLike
+) -> tuple[Array, tuple[Reason | None, ...]]:
+    """Joints (n, 6) [deg] of n taught points, and for each without joints the reason why none fits; NaN there."""
+    refused = _refused(cell)
+    old = np.atleast_2d(np.asarray(configuration, dtype=np.int64))
+    if refused is not None or not isinstance(cell.model, OpwRobot):
+        return np.full((len(old), 6), np.nan), (refused,) * len(old)
+    return _taught(cell, cell.model, _branches(cell, cell.model, tool2world, tool2flange, len(old)), old)
+
+
+def reconfigure(
+    cell: RobotCell,
+    tool2flange: RigidTransform,
+    old_tool2world: RigidTransform,
+    new_tool2world: RigidTransform,
+    configuration: npt.ArrayLike,
+) -> Reconfiguration:
+    """Status and turn, or confdata, of moved targets. The robot holds the tool; an external TCP is not handled here.
+
+    Parameters
+    ----------
+    cell : RobotCell
+        The robot.
+    tool2flange : RigidTransform
+        TCP seen from the flange, one for all or n.
+    old_tool2world, new_tool2world : RigidTransform
+        TCP poses in the world before and after, one or n; the new ones as they are printed.
+    configuration : array_like of int
+        Old ``S, T`` (n, 2) or ``cf1, cf4, cf6, cfx`` (n, 4).
+    """
+    old = np.atleast_2d(np.asarray(configuration, dtype=np.int64))
+    old_joints, reasons = taught_joints(cell, tool2flange, old_tool2world, old)
+    joints, result = np.full((len(old), 6), np.nan), old.copy()
+    rows = np.flatnonzero([reason is None for reason in reasons])
+    model = cell.model
+    if not len(rows) or not isinstance(model, OpwRobot):
+        return Reconfiguration(result, joints, old_joints, reasons)
+    branches = _branches(cell, model, new_tool2world, tool2flange, len(old))[rows]
+    joints[rows] = _nearest(model, branches, old_joints[rows])
+    found = list(reasons)
+    reached = rows[np.isfinite(joints[rows]).all(axis=1)]
+    if len(reached):
+        result[reached] = configuration_of(cell, joints[reached], old[reached])
+    for row in rows:
+        found[row] = _objection(cell, model, new_tool2world, tool2flange, joints[row], old_joints[row], int(row))
+    refused = np.array([reason is not None for reason in found])
+    result[refused] = old[refused]
+    return Reconfiguration(result, joints, old_joints, tuple(found))
+
+
+def _refused(cell: RobotCell) -> Reason | None:
+    """Why no target of this cell can be computed."""
+    name = cell.model.name or "the robot"
+    if not isinstance(cell.model, OpwRobot):
+        return Reason("CONFIG_NOT_CHECKED", f"{name} has no spherical wrist: no status, turn or confdata")
+    if cell.on_track:
+        return Reason("CONFIG_NOT_CHECKED", f"{name} stands on an external axis: its base is not known for each target")
+    return None
+
+
+def _scheme(cell: RobotCell) -> Scheme:
+    return status_turn if cell.language == "krl" else confdata
+
+
+def _branches(
+    cell: RobotCell, model: OpwRobot, tool2world: RigidTransform, tool2flange: RigidTransform, count: int
+) -> Array:
+    """All solutions of n TCP poses, shape (n, 8, 6)."""
+    found = model.inverse(cell.flange2base(tool2world, tool2flange))
+    return np.broadcast_to(found, (count, *found.shape[1:])) if len(found) != count else found
+
+
+def _taught(
+    cell: RobotCell, model: OpwRobot, branches: Array, old: Integers
+) -> tuple[Array, tuple[Reason | None, ...]]:
+    """Solution of each taught point that has its old numbers."""
+    scheme = _scheme(cell)
+    tolerance = ACCURATE if cell.absolute_accuracy else TAUGHT
+    exists: Bools = np.asarray(np.isfinite(branches).all(axis=-1))
+    fits = exists & scheme.posture_matches(model, branches, old, tolerance)
+    angles, turned = chosen_turn(
+        branches[..., None] + TURNS, scheme.turn_matches(branches, old, tolerance), cell.limits
+    )
+    inside = (outside(angles, cell.limits) <= tolerance).all(axis=-1)
+    usable = fits & turned.all(axis=-1) & inside
+    cost = np.where(usable, np.abs(angles).sum(axis=-1), np.inf)
+    best = np.argmin(cost, axis=1)
+    joints = angles[np.arange(len(old)), best]
+    reasons: list[Reason | None] = []
+    undefined = scheme.undefined(old)
+    for row in range(len(old)):
+        reason = None
+        if undefined[row] or not usable[row].any():
+            reason = _misfit(cell, scheme, old[row], exists[row], fits[row], angles[row])
+        elif model.coupled_23 and _differ(angles[row, usable[row]]):
+            reason = _inconsistent(cell, f"{scheme.text(old[row])} fits several solutions of the taught pose")
+        reasons.append(reason)
+    joints[[reason is not None for reason in reasons]] = np.nan
+    return joints, tuple(reasons)
+
+
+def _misfit(cell: RobotCell, scheme: Scheme, old: Integers, exists: Bools, fits: Bools, angles: Array) -> Reason:
+    """Say why no solution of a taught point has its old numbers."""
+    shown = scheme.text(old)
+    if scheme.undefined(old[None])[0]:
+        return _inconsistent(cell, f"{shown} is no configuration")
+    if not exists.any():
+        return _inconsistent(cell, "the taught pose itself is out of reach: tool, base or robot model differ")
+    if fits.any() and cell.limits is not None:
+        beyond = outside(angles, cell.limits)
+        branch = int(np.argmin(np.where(fits, np.nan_to_num(beyond, nan=np.inf).max(axis=-1), np.inf)))
+        axis = int(np.argmax(beyond[branch]))
+        if beyond[branch, axis] > 0.0:
+            low, high = cell.limits[axis]
+            where = f"axis {axis + 1} would stand at {angles[branch, axis]:.3f}, outside {low:g} .. {high:g}"
+            return _inconsistent(cell, f"{shown} fits no solution of the taught pose: {where}")
+    return _inconsistent(cell, f"{shown} fits no joint solution of the taught pose")
+
+
+def _inconsistent(cell: RobotCell, message: str) -> Reason:
+    return Reason("CONFIG_INCONSISTENT", f"{message} ({cell.model.name or 'robot'})")
+
+
+def _differ(solutions: Array) -> bool:
+    return bool(len(solutions) > 1 and np.ptp(solutions, axis=0).max() > 1e-3)
+
+
+def _nearest(model: OpwRobot, branches: Array, old_joints: Array) -> Array:
+    """Of all solutions (n, 8, 6), with their full turns, the one with the smallest largest travel, shape (n, 6)."""
+    turned = nearest_turn(branches, old_joints[:, None, :], model.revolute)
+    travel = np.abs(turned - old_joints[:, None, :]).max(axis=-1)
+    best = np.argmin(np.where(np.isfinite(travel), travel, np.inf), axis=1)
+    return np.asarray(turned[np.arange(len(best)), best])
+
+
+def _objection(
+    cell: RobotCell,
+    model: OpwRobot,
+    tool2world: RigidTransform,
+    tool2flange: RigidTransform,
+    joints: Array,
+    old_joints: Array,
+    row: int,
+) -> Reason | None:
+    """Say why a moved target must not be written with these joints."""
+    if not np.isfinite(joints).all():
+        poses = cell.flange2base(tool2world, tool2flange)
+        return Reason("OUT_OF_REACH", f"out of reach: {model.reach_text(poses if poses.single else poses[row])}")
+    beyond = outside(joints, cell.limits)
+    if cell.limits is not None and beyond.max() > 0.0:
+        axis = int(np.argmax(beyond))
+        low, high = cell.limits[axis]
+        return Reason(
+            "OUT_OF_LIMITS",
+            f"axis {axis + 1} would stand at {joints[axis]:.3f} deg, outside its limits {low:g} .. {high:g} "
+            f"(before: {old_joints[axis]:.3f})",
+        )
+    if cell.absolute_accuracy:
+        margins = _scheme(cell).margins(model, joints[None])[0]
+        if margins.min() < ACCURATE:
+            return Reason(
+                "CONFIG_NOT_CHECKED",
+                f"an absolutely accurate robot {margins.min():.2f} deg from a change of its configuration: "
+                "joints from nominal lengths cannot decide it",
+            )
+    return None

@@ -1,0 +1,158 @@
+"""A KUKA robot from its ``$machine.dat``: lengths, limits, place (facts: krl.md section 7).
+
+No list of robots is needed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from respot.geometry import Array, pose, rotation_from_abc
+from respot.kinematics.cell import Reason, RobotCell
+from respot.kinematics.model import RobotModel
+from respot.kinematics.opw import OpwRobot
+from respot.program.robot import Machine
+
+Values = Mapping[str, object]
+
+#: What a standard six-axis arm with a central hand says of itself; any other value is another kind of arm.
+STANDARD: dict[str, object] = {
+    "$KINCLASS": "#STANDARD",
+    "$MAIN_AXIS": "#NR",
+    "$WRIST_AXIS": "#ZEH",
+    "$TRAFO_AXIS": 6.0,
+    "$A4PAR": 0.0,
+    "$SPINDLE": 0.0,
+    "$DEF_A4FIX": "FALSE",
+    "$DEF_A5LINK": "FALSE",
+    **{f"$AXIS_SEQ[{n}]": float(n) for n in range(1, 7)},
+    **{f"$AXIS_DIR[{n}]": sign for n, sign in enumerate((-1.0, 1.0, 1.0, -1.0, -1.0, -1.0), start=1)},
+    **{f"$AXIS_TYPE[{n}]": 3.0 for n in (1, 2, 3, 5)},
+}
+#: Rotation and offsets that the frames of such an arm have; the other components are its lengths.
+FRAMES: dict[str, dict[str, float]] = {
+    "$TIRORO": {"X": 0.0, "Y": 0.0, "A": 0.0, "B": 0.0, "C": 0.0},
+    "$TFLWP": {"X": 0.0, "Y": 0.0, "A": 0.0, "B": 0.0, "C": 0.0},
+    "$TX3P3": {"Y": 0.0, "A": 0.0, "B": 90.0, "C": 0.0},
+    "$DH_4": {"DHART_A": 0.0, "DHART_D": 0.0, "DHART_ALPHA": 90.0},
+    "$DH_5": {"DHART_A": 0.0, "DHART_D": 0.0, "DHART_ALPHA": -90.0},
+}
+SIGNS = (-1, 1, 1, -1, 1, -1)
+OFFSETS = (0.0, -90.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def kuka_cell(machine: Machine, robot: RobotModel | None = None) -> RobotCell | Reason:
+    """Cell of a KUKA robot, or why its machine data do not make one; ``robot`` replaces their lengths."""
+    values = machine.values
+    model = robot or _model(machine.model, values)
+    if isinstance(model, Reason):
+        return model
+    if "$ROBROOT" in values:
+        robroot = frame(values, "$ROBROOT")
+        if robroot is None:
+            return _no("$ROBROOT does not hold six numbers")
+    else:
+        robroot = RigidTransform.identity()
+    limits, notes = _limits(values)
+    if limits is not None and model.limits_deg is None and model.axes == len(limits):
+        try:
+            model = model.with_limits(limits)
+        except ValueError as error:
+            return _no(f"software limits: {error}")
+    if "$ROBROOT" not in values:
+        notes.append("$ROBROOT is not in the machine data: the robot is taken to stand in the world's origin")
+    on_track = _on_track(values)
+    if on_track:
+        notes.append("the robot stands on an external axis ($EX_KIN, #ERSYS): its base moves")
+    count = values.get("$EX_AX_NUM", 0.0)
+    accurate = str(values.get("$ABS_ACCUR", "")).upper() in ("#ACTIVE", "TRUE")
+    return RobotCell(
+        model=model,
+        language="krl",
+        robroot=robroot,
+        absolute_accuracy=accurate,
+        on_track=on_track,
+        external_axes=int(count) if isinstance(count, float) else 0,
+        notes=tuple(notes),
+    )
+
+
+def _model(name: str, values: Values) -> OpwRobot | Reason:
+    if not any(key in values for key in ("$LENGTH_A", "$LENGTH_B", "$TX3P3")):
+        return _no("the backup holds no machine data ($machine.dat) with lengths")
+    for key, expected in STANDARD.items():
+        found = values.get(key)
+        if found is not None and (found.upper() if isinstance(found, str) else found) != expected:
+            return _no(f"{key} is {_shown(found)}, a standard arm has {_shown(expected)}: no model of this kind of arm")
+    for key, fixed in FRAMES.items():
+        members = values.get(key)
+        if members is None and key.startswith("$DH"):
+            continue
+        for member, expected_number in fixed.items():
+            number = _number(members, member)
+            if number is None or abs(number - expected_number) > 1e-6:
+                shown = "missing" if number is None else f"{number:g}"
+                return _no(f"{member} of {key} is {shown}, a standard arm has {expected_number:g}")
+    return _from_lengths(name, values)
+
+
+def _from_lengths(name: str, values: Values) -> OpwRobot | Reason:
+    lengths = {
+        "c1": _number(values.get("$TIRORO"), "Z"),
+        "a1": _plain(values.get("$LENGTH_A")),
+        "c2": _plain(values.get("$LENGTH_B")),
+        "c3": _number(values.get("$TX3P3"), "X"),
+        "a2": _number(values.get("$TX3P3"), "Z"),
+        "c4": _number(values.get("$TFLWP"), "Z"),
+    }
+    known = {key: value for key, value in lengths.items() if value is not None}
+    if len(known) < len(lengths):
+        return _no("$TIRORO, $LENGTH_A, $LENGTH_B, $TX3P3 or $TFLWP is missing or no number")
+    known["a2"] = -known["a2"]
+    try:
+        return OpwRobot(name=name, source="$machine.dat", **known, signs=SIGNS, offsets_deg=OFFSETS)  # type: ignore[arg-type]
+    except ValueError as error:
+        return _no(str(error))
+
+
+def _limits(values: Values) -> tuple[Array | None, list[str]]:
+    pairs = [[_plain(values.get(f"$SOFT{end}_END[{n}]")) for end in "NP"] for n in range(1, 7)]
+    if all(bound is None for pair in pairs for bound in pair):
+        return None, ["software limits unknown, not checked"]
+    notes = [f"software limit of axis {n} unknown" for n, pair in enumerate(pairs, 1) if None in pair]
+    open_bounds = [[-np.inf if low is None else low, np.inf if high is None else high] for low, high in pairs]
+    limits = np.array(open_bounds, dtype=float)
+    endless = [n for n in range(1, 7) if values.get(f"$AXIS_TYPE[{n}]") == 5.0]
+    limits[[n - 1 for n in endless]] = -np.inf, np.inf
+    return limits, notes
+
+
+def _on_track(values: Values) -> bool:
+    """Whether an external kinematic carries the robot: a member of $EX_KIN is #ERSYS."""
+    kinematics = values.get("$EX_KIN")
+    return isinstance(kinematics, Mapping) and any(str(kind).upper() == "#ERSYS" for kind in kinematics.values())
+
+
+def frame(values: Values, key: str) -> RigidTransform | None:
+    """Pose of a FRAME of the machine data; None unless it holds six numbers."""
+    numbers = [number for name in "XYZABC" if (number := _number(values.get(key), name)) is not None]
+    return pose(numbers[:3], rotation_from_abc(numbers[3:])) if len(numbers) == 6 else None
+
+
+def _number(members: object, name: str) -> float | None:
+    return _plain(members.get(name)) if isinstance(members, Mapping) else None
+
+
+def _plain(value: object) -> float | None:
+    return float(value) if isinstance(value, int | float) and np.isfinite(value) else None
+
+
+def _shown(value: object) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _no(message: str) -> Reason:
+    return Reason("CONFIG_NOT_CHECKED", message)
