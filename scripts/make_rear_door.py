@@ -131,6 +131,11 @@ def real(value: float) -> str:
     return short if np.float32(short) == single else f"{single:#.9g}"
 
 
+def coordinate(value: float) -> str:
+    """Print a coordinate of a point: float32 with all its nine digits, so that base times point stays exact."""
+    return f"{np.float32(value):#.9g}"
+
+
 def krl_numbers(name: str, text: str) -> list[float]:
     """Numbers of an aggregate such as ``BASE_DATA[1]={X 1.0,Y 2.0}``."""
     return [float(part.split()[1]) for part in find(rf"(?m)^(?:\w+ )*{re.escape(name)}={{(.*?)}}", text).split(",")]
@@ -175,7 +180,8 @@ class Krl:
             return
         self.taught.add(name)
         local = self.frame().inv() * world
-        shown = [real(v) for v in [*local.translation, *local.rotation.as_euler("ZYX", degrees=True)]]
+        shown = [coordinate(v) for v in local.translation]
+        shown += [real(v) for v in local.rotation.as_euler("ZYX", degrees=True)]
         printed = self.frame() * pose(*[float(s) for s in shown])
         status, turn = status_turn(self.arm.solve(printed))
         numbers = ",".join(f"{n} {s}" for n, s in zip("XYZABC", shown, strict=True))

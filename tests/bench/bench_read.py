@@ -84,28 +84,24 @@ def _collect(tree: Tree[Token], fields: Fields) -> None:
     for child in tree.children:
         if not isinstance(child, Tree):
             continue
-        if child.data == "number":
-            _add(child, 1.0, None, fields)
-        elif child.data == "signed" and _is_number(child):
-            sign, start = 1.0, None
-            while child.data == "signed":
-                start = child.children[0].start_pos if start is None else start
-                sign = -sign if child.children[0] == "-" else sign
-                child = child.children[1]
-            _add(child, sign, start, fields)
-        else:
+        tokens = _literal(child)
+        if tokens is None:
             _collect(child, fields)
+        else:
+            sign = -1.0 if tokens[:-1].count("-") % 2 else 1.0
+            fields.append((sign * float(tokens[-1]), (tokens[0].start_pos or 0, tokens[-1].end_pos or 0)))
 
 
-def _is_number(tree: Tree[Token]) -> bool:
-    inner = tree.children[1]
-    return isinstance(inner, Tree) and (inner.data == "number" or (inner.data == "signed" and _is_number(inner)))
-
-
-def _add(tree: Tree[Token], sign: float, start: int | None, fields: Fields) -> None:
-    token = tree.children[0]
-    assert isinstance(token, Token) and token.start_pos is not None and token.end_pos is not None
-    fields.append((sign * float(token), (token.start_pos if start is None else start, token.end_pos)))
+def _literal(tree: Tree[Token]) -> list[Token] | None:
+    """Return the signs and the number of a literal, None for anything else."""
+    if tree.data == "number":
+        return [child for child in tree.children if isinstance(child, Token)]
+    if tree.data == "signed":
+        sign, operand = tree.children
+        below = _literal(operand) if isinstance(operand, Tree) else None
+        if isinstance(sign, Token) and below is not None:
+            return [sign, *below]
+    return None
 
 
 # input
@@ -152,7 +148,8 @@ def rapid_table(size: int, seed: int = 1) -> bytes:
 def krl_programs(size: int, seed: int = 1) -> list[bytes]:
     """Return programs with inline forms, logic and calls; about one new shape of statement in fifty lines."""
     dice = random.Random(seed)
-    programs, total = [], 0
+    programs: list[bytes] = []
+    total = 0
     while total < size:
         programs.append(_program(dice, len(programs)))
         total += len(programs[-1])
@@ -323,7 +320,7 @@ def main() -> None:
         ("RAPID point table", "rapid", [rapid_table(size)]),
     ]
     if arguments.corpus:
-        import corpus
+        import corpus  # type: ignore[import-not-found]  # a script, no package
 
         known = corpus.LANGUAGES["krl"]
         found = [

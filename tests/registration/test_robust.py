@@ -96,7 +96,7 @@ def test_consensus_takes_over_where_least_squares_is_lost(points):
     rng = np.random.default_rng(5)
     source, reference, true, wrong = table(rng, 40, bad=0.45, reach=(0, 1))
     other = points.move(true, points.turn((1, 0, 0), 25), (300, 0, 0))  # a second body: least squares lies between
-    reference[wrong] = other[wrong]
+    reference[wrong] = other[wrong] + rng.normal(size=(int(wrong.sum()), 3))
     fit = fit_robust(source, reference)
     assert fit.start == "consensus"
     assert np.linalg.norm(fit.rigid.predict(source) - true, axis=1).max() < 1

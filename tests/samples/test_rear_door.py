@@ -298,6 +298,7 @@ def test_number_style():
             assert np.linalg.norm(numbers(target)[3:7]) == pytest.approx(1, abs=2e-9)
     positions = [n for _, _, _, t in abb_points("RearDoor").values() for n in re.findall(NUMBER, t)[:3]]
     assert np.mean([len(n.partition(".")[2]) >= 5 for n in positions]) > 0.7
+    assert min(len(n.partition(".")[2]) for n in positions) >= 4
 
 
 def robot_files():

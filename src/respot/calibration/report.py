@@ -45,6 +45,7 @@ def report(fit: SpotFit) -> dict[str, Any]:
         "rotation_support": {
             "supported": fit.support.supported,
             "p_value": fit.support.p_value,
+            "p_value_by_axis": fit.support.p_value_by_axis,
             "f_value": fit.support.f_value,
             "angle": fit.support.angle,
             "translation_leave_one_out": fit.support.translation_loo,

@@ -11,7 +11,6 @@ from typing import Any
 from respot import __version__
 from respot.calibration.calibration import Calibration, CalibrationError
 from respot.calibration.source_fit import FitOptions, SourceFit, fit_source
-from respot.correction.configuration import configurator_of
 from respot.correction.correction import Correction, align
 from respot.correction.options import CorrectionOptions
 from respot.issues import BadInputError, Issue
@@ -140,9 +139,7 @@ def convert(
     moves = _moves_of(read, ids)
     if not moves:
         raise BadInputError("NO_COMMON_IDS", "holds none of the spots that the calibration was fitted to", str(source))
-    correction = align(
-        read.robot, model.source2reference, model.content_hash, moves, options, configurator_of(read.robot)
-    )
+    correction = align(read.robot, model.source2reference, model.content_hash, moves, options)
     refused = [
         Issue(refusal.code, f"{refusal.target}: {refusal.message}", refusal.path, refusal.line)
         for refusal in correction.refused

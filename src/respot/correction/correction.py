@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Protocol
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import Delaunay, QhullError
 from scipy.spatial.transform import RigidTransform
 
 from respot import __version__
+from respot.correction.configuration import configure, notes_of
 from respot.correction.options import CorrectionOptions
 from respot.correction.points import PointEdit, moves_at_all, new_offset, new_pose, offset_edit, point_edit
 from respot.correction.scope import Moving, Refusal, Scope, Stay, find_scope
@@ -22,28 +22,8 @@ from respot.program.moves import Move
 from respot.program.robot import Robot
 from respot.source import Edit, splice
 
-
-@dataclass(frozen=True)
-class Configured:
-    """What becomes of a moved target's status and turn or confdata.
-
-    Parameters
-    ----------
-    values : mapping of str to float
-        New values by field; empty where nothing changes.
-    refusal : str
-        Why the new pose has no configuration; empty where it has one.
-    """
-
-    values: Mapping[str, float] = field(default_factory=dict)
-    refusal: str = ""
-
-
-class Configurator(Protocol):
-    """Computes configurations anew; made from the robot's kinematic model."""
-
-    def configure(self, moving: Sequence[Moving], after: Sequence[RigidTransform]) -> Sequence[Configured]:
-        """Configuration of each target for its new pose in its base."""
+#: What `--keep-config` may override: not a pose that the robot cannot reach.
+_KEPT = frozenset(("CONFIG_NOT_CHECKED", "CONFIG_INCONSISTENT", "UNKNOWN_TOOL"))
 
 
 @dataclass(frozen=True)
@@ -114,7 +94,6 @@ def align(
     calibration_hash: str,
     spot_moves: Sequence[Move],
     options: CorrectionOptions,
-    configurator: Configurator | None,
 ) -> Correction:
     """Write programs whose targets are the model's image of the old ones.
 
@@ -130,8 +109,6 @@ def align(
         Motions of the matched spots that the model was fitted to.
     options : CorrectionOptions
         What a person decided.
-    configurator : Configurator or None
-        None where no kinematic model is known.
 
     Raises
     ------
@@ -144,7 +121,7 @@ def align(
     after = {id(moving): new_pose(moving, source2reference) for moving in scope.moving}
     moving = [item for item in scope.moving if _moves(item, after[id(item)])]
     refused = [*scope.refusals, *_too_far(moving, after, options)]
-    configured = _configure(moving, after, language, options, configurator, refused)
+    configured = _configure(robot, moving, after, language, options, refused)
     refused_programs = _refused_programs(scope, refused) if not options.partial else frozenset[str]()
     kept = _Kept(refused, refused_programs, options.partial)
     edits = _edits(robot, language, options, kept, moving, after, configured, scope, source2reference)
@@ -160,7 +137,7 @@ def align(
         refused_programs=refused_programs,
         transitions=_transitions(scope, {id(item.target) for item in moving}, refused_programs),
         files=_changed_files(robot, language, options, edits, header),
-        reconfigured=configurator is not None and not any(item.code == "CONFIG_NOT_CHECKED" for item in refused),
+        reconfigured=all(id(item) in configured for item in moving if language.has_configuration(item.target)),
         issues=_issues(robot, moving, spot_moves, edits),
     )
 
@@ -219,30 +196,23 @@ def _refusals(moving: Moving, code: str, message: str) -> list[Refusal]:
 
 
 def _configure(
+    robot: Robot,
     moving: Sequence[Moving],
     after: Mapping[int, RigidTransform],
     language: Language,
     options: CorrectionOptions,
-    configurator: Configurator | None,
     refused: list[Refusal],
 ) -> dict[int, Mapping[str, float]]:
     """Configurations by target; targets without one are added to ``refused``."""
     carrying = [item for item in moving if language.has_configuration(item.target)]
-    if configurator is None:
-        if not options.keep_config:
-            message = (
-                "no kinematic model: status/turn or confdata cannot be computed; --keep-config keeps the old values"
-            )
-            for item in carrying:
-                refused += _refusals(item, "CONFIG_NOT_CHECKED", message)
-        return {}
+    results = configure(robot, language, carrying, [after[id(item)] for item in carrying])
     found: dict[int, Mapping[str, float]] = {}
-    results = configurator.configure(carrying, [after[id(item)] for item in carrying])
     for item, result in zip(carrying, results, strict=True):
-        if not result.refusal:
+        if not result.code:
             found[id(item)] = result.values
-        elif not options.keep_config:
-            refused += _refusals(item, "CONFIG_NOT_CHECKED", result.refusal)
+        elif not (options.keep_config and result.code in _KEPT):
+            hint = "; --keep-config keeps the old values" if result.code in _KEPT else ""
+            refused += _refusals(item, result.code, f"{result.message}{hint}")
     return found
 
 
@@ -321,6 +291,7 @@ def _issues(
     edits: Sequence[PointEdit],
 ) -> list[Issue]:
     issues = [Issue("NOT_CHECKED", "collisions are never checked: simulate or step through the programs before use")]
+    issues += [Issue("NOT_CHECKED", note) for note in notes_of(robot)]
     issues += _extrapolated(moving, spot_moves)
     for path in dict.fromkeys(edit.path for edit in edits):
         if LANGUAGES[robot.language].header_place(robot.files[path]) is None:

@@ -1,15 +1,16 @@
 """Which targets move, which stay, and which cannot be told (DESIGN section 6, scope).
 
-In scope are the routines that hold a matched spot and what they call. A target moves if a routine in scope goes to it
-under a base that a matched spot uses. Targets there under other bases (tip dresser, racks) stay. Under the world frame
-a routine must be known as a service routine by its name, since the program does not tell whether the target belongs to
-the part.
+In scope are the routines that hold a matched spot, what they call, and what calls them: an approach that stands in the
+caller belongs to the part as much as the spot. A target moves if a routine in scope goes to it under a base that a
+matched spot uses. Targets there under other bases (tip dresser, racks) stay. Under the world frame a routine must be
+known as a service routine by its name, or only call the others, since the program does not tell whether the target
+belongs to the part.
 """
 
 from __future__ import annotations
 
 import fnmatch
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from respot.languages import Language
@@ -93,46 +94,71 @@ def find_scope(robot: Robot, language: Language, spot_moves: Iterable[Move], pro
         Glob of programs to take in place of the routines with matched spots.
     """
     spots = list(spot_moves)
-    scope = Scope(routines=_routines(robot, spots, programs))
+    routines, core = _routines(robot, spots, programs)
+    scope = Scope(routines=routines)
     bases = {id(move.base) for move in spots}
     uses: dict[int, list[Move]] = {}
-    for move in (move for routine in scope.routines for move in routine.moves):
-        refusal = _refusal(move, bases, language)
-        if refusal is not None:
-            scope.refusals.append(refusal)
-            continue
-        if _is_moving(move, bases, language):
-            if move.target is not None:
-                uses.setdefault(id(move.target), []).append(move)
-            if move.offset is not None:
-                scope.offsets.append(move)
+    for routine in routines:
+        for move in routine.moves:
+            refusal = _refusal(move, bases, language, calls_only=id(routine) not in core)
+            if refusal is not None:
+                scope.refusals.append(refusal)
+            elif _is_moving(move, bases, language):
+                if move.target is not None:
+                    uses.setdefault(id(move.target), []).append(move)
+                if move.offset is not None:
+                    scope.offsets.append(move)
+    everywhere: dict[int, list[Move]] = {}
+    for move in robot.moves():
+        if move.target is not None:
+            everywhere.setdefault(id(move.target), []).append(move)
     for target in robot.targets:
-        _decide(scope, robot, target, uses.get(id(target), []))
+        _decide(scope, target, uses.get(id(target), []), everywhere.get(id(target), []), bases)
     return scope
 
 
-def _routines(robot: Robot, spots: Sequence[Move], programs: str | None) -> list[Routine]:
+def _routines(robot: Robot, spots: Sequence[Move], programs: str | None) -> tuple[list[Routine], set[int]]:
+    """Routines in scope, and which of them weld or are called by one that does."""
     if programs is not None:
-        return [r for r in robot.routines if fnmatch.fnmatchcase(r.program.lower(), programs.lower())]
+        found = [r for r in robot.routines if fnmatch.fnmatchcase(r.program.lower(), programs.lower())]
+        return found, {id(routine) for routine in found}
     held = {id(move) for move in spots}
+    calls = _calls(robot)
+    holding = [routine for routine in robot.routines if any(id(move) in held for move in routine.moves)]
+    core = _reach(holding, calls)
+    callers: dict[int, list[Routine]] = {}
+    for routine in robot.routines:
+        for called in calls[id(routine)]:
+            callers.setdefault(id(called), []).append(routine)
+    wide = _reach(holding, callers) | core
+    return [routine for routine in robot.routines if id(routine) in wide], core
+
+
+def _calls(robot: Robot) -> dict[int, list[Routine]]:
+    """Routines that each routine calls; a routine of the same program hides others of its name."""
     by_name: dict[str, list[Routine]] = {}
     for routine in robot.routines:
         by_name.setdefault(routine.name.lower(), []).append(routine)
-    pending = [routine for routine in robot.routines if any(id(move) in held for move in routine.moves)]
-    found: dict[int, Routine] = {}
-    while pending:
-        routine = pending.pop()
-        if id(routine) in found:
-            continue
-        found[id(routine)] = routine
+    calls: dict[int, list[Routine]] = {}
+    for routine in robot.routines:
+        called = calls.setdefault(id(routine), [])
         for name in routine.calls:
             named = by_name.get(name.lower(), [])
-            own = [other for other in named if other.program == routine.program]
-            pending += own or named
-    return [routine for routine in robot.routines if id(routine) in found]
+            called += [other for other in named if other.program == routine.program] or named
+    return calls
 
 
-def _refusal(move: Move, bases: set[int], language: Language) -> Refusal | None:
+def _reach(start: Iterable[Routine], edges: Mapping[int, Sequence[Routine]]) -> set[int]:
+    pending, found = list(start), set[int]()
+    while pending:
+        routine = pending.pop()
+        if id(routine) not in found:
+            found.add(id(routine))
+            pending += edges.get(id(routine), ())
+    return found
+
+
+def _refusal(move: Move, bases: set[int], language: Language, calls_only: bool) -> Refusal | None:
     name = str(move.target) if move.target is not None else f"{move.instruction}@{move.line}"
 
     def refuse(code: str, message: str) -> Refusal:
@@ -146,7 +172,8 @@ def _refusal(move: Move, bases: set[int], language: Language) -> Refusal | None:
         return refuse("UNKNOWN_FRAME", "the program does not tell the base of this motion")
     if move.base.pose is None:
         return refuse("UNKNOWN_FRAME", f"base {move.base}: {move.base.unknown}")
-    if move.base.world and id(move.base) not in bases and not language.forms.is_service(move.routine):
+    elsewhere = calls_only or language.forms.is_service(move.routine)
+    if move.base.world and id(move.base) not in bases and not elsewhere:
         message = (
             f"{move.routine} welds under other bases but goes to this target in the world frame: "
             "respot cannot tell whether it belongs to the part"
@@ -173,20 +200,19 @@ def _is_moving(move: Move, bases: set[int], language: Language) -> bool:
     return not (move.base.world and language.forms.is_service(move.routine))
 
 
-def _decide(scope: Scope, robot: Robot, target: Target, moves: list[Move]) -> None:
+def _decide(scope: Scope, target: Target, moves: list[Move], everywhere: list[Move], bases: set[int]) -> None:
     if target.kind is TargetKind.JOINTS:
         scope.stays.append(Stay(target, "JOINT_TARGET"))
         return
-    everywhere = [move for move in robot.moves() if move.target is target]
     if not moves:
-        in_scope = {id(move) for routine in scope.routines for move in routine.moves}
-        reached = any(id(move) in in_scope for move in everywhere)
-        scope.stays.append(Stay(target, "OUT_OF_SCOPE" if reached or everywhere else "NOT_REACHED"))
+        same_base = any(id(move.base) in bases for move in everywhere)
+        code = "SAME_BASE_STAYS" if same_base else "OUT_OF_SCOPE" if everywhere else "NOT_REACHED"
+        scope.stays.append(Stay(target, code))
         return
-    bases = {id(move.base): move.base for move in everywhere}
+    used = {id(move.base): move.base for move in everywhere}
     base = moves[0].base
-    if len(bases) > 1 or base is None:
-        names = " and ".join(str(other) for other in bases.values())
+    if len(used) > 1 or base is None:
+        names = " and ".join("an unknown base" if other is None else str(other) for other in used.values())
         message = f"it is used under {names}: one literal cannot be right in both"
         first = moves[0]
         scope.refusals.append(Refusal(first.program, target.name, "SHARED_TARGET", message, first.path, first.line))

@@ -162,9 +162,15 @@ def _scheme(cell: RobotCell) -> Scheme:
 def _branches(
     cell: RobotCell, model: OpwRobot, tool2world: RigidTransform, tool2flange: RigidTransform, count: int
 ) -> Array:
-    """All solutions of n TCP poses, shape (n, 8, 6)."""
-    found = model.inverse(cell.flange2base(tool2world, tool2flange))
-    return np.broadcast_to(found, (count, *found.shape[1:])) if len(found) != count else found
+    """All solutions of n TCP poses, shape (n, 8, 6); NaN for a pose that is no number."""
+    finite = np.atleast_1d(np.isfinite(tool2world.translation).all(axis=-1))
+    if not finite.all():
+        places = np.nan_to_num(tool2world.translation, nan=0.0, posinf=0.0, neginf=0.0)
+        tool2world = RigidTransform.from_components(places, tool2world.rotation)
+    found = np.array(model.inverse(cell.flange2base(tool2world, tool2flange)))
+    found = np.array(np.broadcast_to(found, (count, *found.shape[1:])))
+    found[~np.broadcast_to(finite, count)] = np.nan
+    return found
 
 
 def _taught(
@@ -188,7 +194,7 @@ def _taught(
     for row in range(len(old)):
         reason = None
         if undefined[row] or not usable[row].any():
-            reason = _misfit(cell, scheme, old[row], exists[row], fits[row], angles[row])
+            reason = _misfit(cell, scheme, old[row], branches[row])
         elif model.coupled_23 and _differ(angles[row, usable[row]]):
             reason = _inconsistent(cell, f"{scheme.text(old[row])} fits several solutions of the taught pose")
         reasons.append(reason)
@@ -196,22 +202,18 @@ def _taught(
     return joints, tuple(reasons)
 
 
-def _misfit(cell: RobotCell, scheme: Scheme, old: Integers, exists: Bools, fits: Bools, angles: Array) -> Reason:
-    """Say why no solution of a taught point has its old numbers."""
+def _misfit(cell: RobotCell, scheme: Scheme, old: Integers, branches: Array) -> Reason:
+    """Say why no solution (8, 6) of a taught point has its old numbers."""
     shown = scheme.text(old)
-    if scheme.undefined(old[None])[0]:
-        return _inconsistent(cell, f"{shown} is no configuration")
-    if not exists.any():
+    solutions = branches[np.isfinite(branches).all(axis=-1)]
+    if not len(solutions):
         return _inconsistent(cell, "the taught pose itself is out of reach: tool, base or robot model differ")
-    if fits.any() and cell.limits is not None:
-        beyond = outside(angles, cell.limits)
-        branch = int(np.argmin(np.where(fits, np.nan_to_num(beyond, nan=np.inf).max(axis=-1), np.inf)))
-        axis = int(np.argmax(beyond[branch]))
-        if beyond[branch, axis] > 0.0:
-            low, high = cell.limits[axis]
-            where = f"axis {axis + 1} would stand at {angles[branch, axis]:.3f}, outside {low:g} .. {high:g}"
-            return _inconsistent(cell, f"{shown} fits no solution of the taught pose: {where}")
-    return _inconsistent(cell, f"{shown} fits no joint solution of the taught pose")
+    angles, _ = chosen_turn(solutions[..., None] + TURNS, np.ones((*solutions.shape, len(TURNS)), bool), cell.limits)
+    inside = angles[(outside(angles, cell.limits) == 0.0).all(axis=-1)]
+    if not len(inside):
+        return _inconsistent(cell, "the taught pose itself is outside the limits: tool, base or robot model differ")
+    others = dict.fromkeys(scheme.text(other) for other in configuration_of(cell, inside))
+    return _inconsistent(cell, f"{shown} fits no joint solution of the taught pose; those have {' or '.join(others)}")
 
 
 def _inconsistent(cell: RobotCell, message: str) -> Reason:
@@ -241,8 +243,10 @@ def _objection(
 ) -> Reason | None:
     """Say why a moved target must not be written with these joints."""
     if not np.isfinite(joints).all():
-        poses = cell.flange2base(tool2world, tool2flange)
-        return Reason("OUT_OF_REACH", f"out of reach: {model.reach_text(poses if poses.single else poses[row])}")
+        pose, tool = (poses if poses.single else poses[row] for poses in (tool2world, tool2flange))
+        if not np.isfinite(pose.translation).all():
+            return Reason("OUT_OF_REACH", "the moved pose is not a number")
+        return Reason("OUT_OF_REACH", f"out of reach: {model.reach_text(cell.flange2base(pose, tool))}")
     beyond = outside(joints, cell.limits)
     if cell.limits is not None and beyond.max() > 0.0:
         axis = int(np.argmax(beyond))

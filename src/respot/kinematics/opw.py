@@ -116,10 +116,11 @@ class OpwRobot(RobotModel):
 
         Branch ``4 * wrist flipped + 2 * reaching back + elbow``, in this fixed order.
         """
-        batch = RigidTransform.from_matrix(poses.as_matrix()[None]) if poses.single else poses
-        if len(batch) == 0:
-            return np.zeros((0, 8, 6))
-        found = np.asarray(self._solver.reach(batch).joints, dtype=float) + 0.0
+        matrices = np.asarray(poses.as_matrix(), dtype=float).reshape(-1, 4, 4)
+        finite = np.isfinite(matrices).all(axis=(1, 2))
+        found = np.full((len(matrices), 8, 6), np.nan)
+        if finite.any():
+            found[finite] = self._solver.reach(RigidTransform.from_matrix(matrices[finite])).joints + 0.0
         if self.coupled_23:
             found[..., 2] += found[..., 1]
             found[..., 2] -= 360.0 * np.ceil((found[..., 2] - 180.0) / 360.0)

@@ -37,8 +37,8 @@ class Language:
         Whether a target carries status and turn or confdata.
     header_place : callable
         Where the header of a changed file goes.
-    position_fields, rotation_fields : sequence of str
-        Names of a target's fields.
+    configuration_fields : sequence of str
+        Names of status and turn or confdata.
     """
 
     name: str
@@ -50,5 +50,4 @@ class Language:
     decimals: Mapping[str, int]
     has_configuration: Callable[[Target], bool]
     header_place: Callable[[ProgramFile], Span | None]
-    position_fields: Sequence[str]
-    rotation_fields: Sequence[str]
+    configuration_fields: Sequence[str]

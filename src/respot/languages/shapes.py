@@ -18,7 +18,6 @@ from typing import Generic, TypeVar
 
 from lark import Lark, Token, Tree
 from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
-from lark.grammar import Terminal
 
 from respot.program.statement import OPAQUE, Branch, Leaf, Lexicon, Shape
 from respot.resources import resource
@@ -256,8 +255,7 @@ class _Parser:
 
     def __init__(self, grammar: str, start: str) -> None:
         self.lark = Lark(grammar, parser="lalr", start=start, propagate_positions=False, keep_all_tokens=True)
-        terminals = [symbol for rule in self.lark.rules for symbol in rule.expansion if isinstance(symbol, Terminal)]
-        self._dropped = {terminal.name for terminal in terminals if terminal.filter_out}
+        self._kept = frozenset(re.findall(r"^([A-Z]\w*)(?:\.\d+)?:", grammar, re.MULTILINE))
 
     def parse(self, text: str, spans: list[Span]) -> Branch | None:
         """Tree of a statement; None if it is too deep to be walked by recursion.
@@ -286,7 +284,7 @@ class _Parser:
                 continue
             else:
                 begin = end = positions[child.start_pos or 0]
-                if child.type not in self._dropped:
+                if child.type in self._kept:
                     children.append(Leaf(begin, child.type))
             first = begin if first < 0 else first
             last = max(last, end)

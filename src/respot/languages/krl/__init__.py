@@ -14,6 +14,5 @@ KRL = Language(
     decimals=writer.DECIMALS,
     has_configuration=writer.has_configuration,
     header_place=writer.header_place,
-    position_fields=("X", "Y", "Z"),
-    rotation_fields=("A", "B", "C"),
+    configuration_fields=("S", "T"),
 )

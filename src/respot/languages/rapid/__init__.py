@@ -14,6 +14,5 @@ RAPID = Language(
     decimals=writer.DECIMALS,
     has_configuration=writer.has_configuration,
     header_place=writer.header_place,
-    position_fields=("x", "y", "z"),
-    rotation_fields=("q1", "q2", "q3", "q4"),
+    configuration_fields=("cf1", "cf4", "cf6", "cfx"),
 )

@@ -1,15 +1,16 @@
 """Aggregates of literals, which need no parser: a table of robtargets is one statement of ten thousand equal rows.
 
 Arrays of data hold most of the tokens of a backup, and hardly two have the same number of rows. A literal aggregate is
-therefore taken out of a statement before its shape is looked up: an empty one stands in its place, and the rows are laid
-into the tree afterwards, as the grammar would have built them (a test holds both equal).
+therefore taken out of a statement before its shape is looked up: an empty one stands in its place, and the rows are
+laid into the tree afterwards, as the grammar would have built them (a test holds both equal).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Callable, Sequence
 
-from respot.languages.shapes import Part, Shapes
+from respot.languages.shapes import Part, Shapes, Splitter
 from respot.program.statement import OPAQUE, Branch, Leaf, Shape
 from respot.source import Span
 
@@ -35,28 +36,43 @@ class Rows(Branch):
         return rows
 
     @property
-    def children(self) -> tuple[Branch | Leaf, ...]:  # type: ignore[override]
+    def children(self) -> tuple[Branch | Leaf, ...]:
         """The rows."""
         return _aggregate(self._kinds, self.first)[0].children
 
 
 class RapidShapes(Shapes):
-    """The shapes of RAPID: literals are taken out first, and a statement need not have an end."""
+    """The shapes of RAPID: literals are taken out first, and a statement need not have an end.
+
+    Parameters
+    ----------
+    grammar, start, token, split
+        As for `Shapes`.
+    end : callable
+        Position of the last token of the statement that begins at a token; None if it goes on in the next line.
+    """
+
+    def __init__(
+        self,
+        grammar: str,
+        start: str,
+        token: re.Pattern[str],
+        split: Splitter,
+        end: Callable[[list[str], int], int | None],
+    ) -> None:
+        super().__init__(grammar, start, token, split)
+        self._end = end
 
     def last(self, text: str) -> tuple[Part, ...]:
         """Statements of a run of lines that ends with the statement it began, whole or not."""
         kinds, _ = self.kinds(text)
         first, parts = 0, []
         while first < len(kinds):
-            end = self.end_of(kinds, first)
+            end = self._end(kinds, first)
             last = len(kinds) - 1 if end is None else end
             parts.append(Part(first, last, self._shape(text, kinds, first, last)))
             first = last + 1
         return tuple(parts)
-
-    def end_of(self, kinds: list[str], first: int) -> int | None:
-        """Index of the last token of the statement that begins at a token."""
-        raise NotImplementedError
 
     def _parse(self, text: str, spans: list[Span], kinds: tuple[str, ...]) -> Shape:
         taken = literal_aggregates(kinds)

@@ -10,7 +10,8 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 
-from respot.languages.shapes import LONGEST_STATEMENT, Cache, Part, Shapes, Unit
+from respot.languages.rapid.literals import RapidShapes
+from respot.languages.shapes import LONGEST_STATEMENT, Cache, Part, Unit
 from respot.program.statement import OPAQUE, Shape, Statement
 from respot.source import Span
 
@@ -29,6 +30,9 @@ TOKEN = re.compile(
     """,
     re.VERBOSE | re.IGNORECASE,
 )
+
+#: A declaration is read up to this length: a program generator may write ten thousand targets in one.
+LONGEST_TABLE = 16 * 1024 * 1024
 
 COMMENT, AFTER_MODULE = "comment", "after_module"
 #: Kinds that count as no statement (INTERFACES, `check`).
@@ -74,19 +78,6 @@ def _split(kinds: list[str]) -> list[Span] | None:
         last = _end(kinds, first)
         if last is None:
             return None
-        ranges.append((first, last))
-        first = last + 1
-    return ranges
-
-
-def _split_last(kinds: list[str]) -> list[Span]:
-    """Token ranges of the statements where no line belongs to the last one any more."""
-    ranges: list[Span] = []
-    first = 0
-    while first < len(kinds):
-        last = _end(kinds, first)
-        if last is None:
-            last = len(kinds) - 1
         ranges.append((first, last))
         first = last + 1
     return ranges
@@ -159,17 +150,7 @@ def _closing(kinds: list[str], opening: int) -> int | None:
     return None
 
 
-class RapidShapes(Shapes):
-    """The shapes of RAPID, which has statements that no end word closes."""
-
-    def last(self, text: str) -> tuple[Part, ...]:
-        """Statements of a run of lines that ends with the statement it began, whole or not."""
-        kinds, _ = self.kinds(text)
-        ranges = _split_last(kinds)
-        return tuple(Part(first, last, self._shape(text, kinds, first, last)) for first, last in ranges)
-
-
-SHAPES = RapidShapes("rapid", "piece", TOKEN, _split)
+SHAPES = RapidShapes("rapid", "piece", TOKEN, _split, _end)
 _COMMENT = SHAPES.plain(COMMENT)
 _AFTER_MODULE = SHAPES.plain(AFTER_MODULE)
 _TOO_LONG = SHAPES.opaque(f"longer than {LONGEST_STATEMENT // 1024} kB")
@@ -420,8 +401,14 @@ class _Reader:
             self._append(start + spans[part.first][0], start + spans[part.last][1], part.shape)
 
     def _add_long(self, begun: _Begun) -> None:
+        """Take a statement that only a table of data may be: rows of literals are read in no time."""
         self._begun = None
-        self._append(begun.start, begun.stop, _TOO_LONG)
+        table = begun.words[:1] and begun.words[0] in _STORAGE and begun.stop - begun.start <= LONGEST_TABLE
+        parts = SHAPES.read(self._text[begun.start : begun.stop]) if table else None
+        if parts is None:
+            self._append(begun.start, begun.stop, _TOO_LONG)
+        else:
+            self._add(parts, begun.start, begun.stop)
 
     def _append(self, start: int, stop: int, shape: Shape) -> None:
         line = bisect_right(self._line_starts, start)

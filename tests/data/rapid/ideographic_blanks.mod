@@ -1,0 +1,6 @@
+MODULE Blanks
+　VAR　num a;　
+ PROC p()　! c
+　　a:=　1;
+ENDPROC
+ENDMODULE
