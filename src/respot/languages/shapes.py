@@ -40,6 +40,8 @@ _PLAIN_DIGITS = re.compile(r"[0-9]+")
 #: A line with its end, as `respot.source.NEWLINE` cuts them.
 _LINE = re.compile(r"[^\r\n]*(?:\r*\n|\r)|[^\r\n]+\Z")
 
+#: Terminals that hold no word of the language's own.
+_NO_WORDS = frozenset(("NAME", "COMMENT", "STRING"))
 #: Names of the groups of a token pattern whose tokens stand for each other, and their kinds.
 _CLASSES = {"name": "a", "number": "0", "string": '"'}
 
@@ -139,13 +141,10 @@ class Shapes:
         return _Parser(self._text, self._start)
 
     @cached_property
-    def keywords(self) -> frozenset[str]:
-        """Every word, in lower case, that the grammar spells out."""
-        words: set[str] = set()
-        for terminal in self._parser.lark.terminals:
-            if terminal.name not in ("NAME", "NUMBER", "STRING", "COMMENT", "BITS"):
-                words.update(word.lower() for word in re.findall(r"(?<![\\\w])[A-Za-z_]\w*", terminal.pattern.value))
-        return frozenset(words)
+    def _keyword(self) -> re.Pattern[str]:
+        """Finds the names that are a terminal of their own somewhere in the grammar."""
+        patterns = [term.pattern.to_regexp() for term in self._parser.lark.terminals if term.name not in _NO_WORDS]
+        return re.compile("|".join(patterns))
 
     def keys(self, text: str) -> list[str]:
         """Every line of a file, with its end, every run of digits replaced by one.
@@ -213,7 +212,7 @@ class Shapes:
         group = None if match is None else match.lastgroup
         if group == "comment":
             return ""
-        if group is None or (group == "name" and token.lower() in self.keywords):
+        if group is None or (group == "name" and self._keyword.fullmatch(token)):
             return token.upper()
         return _CLASSES.get(group, group)
 
@@ -285,7 +284,8 @@ class _Parser:
             else:
                 begin = end = positions[child.start_pos or 0]
                 if child.type in self._kept:
-                    children.append(Leaf(begin, child.type))
+                    # a terminal X_NAME is a name that the grammar must know where it stands
+                    children.append(Leaf(begin, "NAME" if child.type.endswith("_NAME") else child.type))
             first = begin if first < 0 else first
             last = max(last, end)
         return Branch(str(tree.data), tuple(children), first, last)

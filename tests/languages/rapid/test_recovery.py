@@ -59,7 +59,6 @@ NO_RAPID = [
     "%%%",
     "3;",
     ";",
-    "END;",
     "THEN",
     "a b c;",
     "VAR num;",
@@ -100,7 +99,7 @@ HEADS = [
     ("MODULE m\nPROC p(num a,)\na:=1;\nENDPROC\nENDMODULE", [1, 3, 4, 5]),
     ("MODULE m\nFUNC f()\nRETURN 1;\nENDFUNC\nENDMODULE", [1, 3, 4, 5]),
     ("MODULE m\nTRAP\nENDTRAP\nENDMODULE", [1, 3, 4]),
-    ("MODULE m\nRECORD\nnum x;\nENDRECORD\nENDMODULE", [1, 4, 5]),
+    ("MODULE m\nRECORD\nnum x;\nENDRECORD\nENDMODULE", [1, 3, 4, 5]),
     ("MODULE m\nALIAS num;\nVAR num x;\nENDMODULE", [1, 3, 4]),
     ("MODULE m\nLOCAL num x;\nVAR num x;\nENDMODULE", [1, 3, 4]),
     ("MODULE m\nERROR(a\nRETRY;\nENDMODULE", [1, 3, 4]),
@@ -127,8 +126,17 @@ def test_lost_semicolon_costs_one_statement_each(code: Code) -> None:
 
 
 def test_call_over_lines_is_no_lost_semicolon(code: Code) -> None:
-    text = "PROC p()\n  Foo\n    a;\n  IF x=1\n    Foo;\n  IF x=1\n  Foo;\n  MoveL\n    p1,\n  v100,z10,tGun;\nENDPROC\n"
-    assert [found.kind for found in code(text)] == ["procedure", "call", "compact_if", "compact_if", "call", "end_procedure"]
+    text = (
+        "PROC p()\n  Foo\n    a;\n  IF x=1\n    Foo;\n  IF x=1\n  Foo;\n  MoveL\n    p1,\n  v100,z10,tGun;\nENDPROC\n"
+    )
+    assert [found.kind for found in code(text)] == [
+        "procedure",
+        "call",
+        "compact_if",
+        "compact_if",
+        "call",
+        "end_procedure",
+    ]
 
 
 def test_comments_after_a_broken_statement_stay_comments(read: Code) -> None:

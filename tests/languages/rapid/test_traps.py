@@ -77,7 +77,9 @@ def test_fast_path_is_the_plain_grammar(path: Path) -> None:
 
 def _plain(tree: Tree) -> tuple:
     children = (child for child in tree.children if child is not None)
-    inner = [_plain(child) if isinstance(child, Tree) else (child.type, child.start_pos, child.end_pos) for child in children]
+    inner = [
+        _plain(child) if isinstance(child, Tree) else (child.type, child.start_pos, child.end_pos) for child in children
+    ]
     span = (0, 0) if tree.meta.empty else (tree.meta.start_pos, tree.meta.end_pos)
     return (str(tree.data), *span, *inner)
 
@@ -89,7 +91,7 @@ def _fast(node: Node) -> tuple:
 
 def test_every_literal_aggregate_is_laid_in_as_parsed() -> None:
     """Aggregates of literals do not pass the grammar: what is built for them must be what it builds."""
-    rows = "[TRUE,[1,-2.5,+3,- 4],\"a\",[],[[0x1F],[false]]]"
+    rows = '[TRUE,[1,-2.5,+3,- 4],"a",[],[[0x1F],[false]]]'
     text = f"VAR t x:={rows};"
     assert "Rows" not in repr(type(SHAPES.read(text)[0].shape.tree))
     plain = SHAPES.lark.parse(text, start="piece")

@@ -63,6 +63,7 @@ _CLOSERS = {
 #: What stands within a block -> the kind of the block.
 _INNER = {"else_": "if_", "case": "switch", "default": "switch"}
 _HEADS = frozenset(("routine", "function", "data_list"))
+_BLOCK_KINDS = frozenset((*_OPENERS, *_CLOSERS, *_INNER))
 
 
 def routines(statements: Iterable[Statement]) -> list[Routine]:
@@ -98,29 +99,70 @@ def block_issues(path: str, statements: Iterable[Statement]) -> list[Issue]:
 
 
 def _unbalanced_blocks(path: str, statements: list[Statement]) -> Iterator[Issue]:
+    for run in _runs(statements):
+        issues = list(_match(path, run, indented=False))
+        # which of several nested blocks lacks its end cannot be told from the words; the indentation often tells
+        yield from _match(path, run, indented=True) if issues else issues
+
+
+def _runs(statements: list[Statement]) -> Iterator[list[Statement]]:
+    """Cut before each head: what is open above a DEF stays open."""
+    run: list[Statement] = []
+    for statement in statements:
+        if statement.kind in _HEADS and run:
+            yield run
+            run = []
+        if statement.kind in _BLOCK_KINDS:
+            run.append(statement)
+    yield run
+
+
+def _match(path: str, statements: list[Statement], indented: bool) -> Iterator[Issue]:
     opened: list[Statement] = []
     for statement in statements:
         kind = statement.kind
         if kind in _OPENERS:
-            if kind in _HEADS:  # a routine within a routine does not exist: what is open above it stays open
-                yield from _unclosed(path, opened)
-                opened.clear()
             opened.append(statement)
         elif kind in _CLOSERS:
-            yield from _close(path, opened, statement, _CLOSERS[kind])
-        elif kind in _INNER and (not opened or opened[-1].kind != _INNER[kind]):
-            yield _issue(path, statement, f"{_word(statement)} stands in no {_OPENERS[_INNER[kind]]}")
+            yield from _close(path, opened, statement, indented)
+        else:
+            yield from _inner(path, opened, statement, indented)
     yield from _unclosed(path, opened)
 
 
-def _close(path: str, opened: list[Statement], closer: Statement, kinds: tuple[str, ...]) -> Iterator[Issue]:
-    depth = next((i for i in range(len(opened) - 1, -1, -1) if opened[i].kind in kinds), None)
-    crosses_routine = depth is not None and any(s.kind in _HEADS for s in opened[depth + 1 :])
-    if depth is None or crosses_routine:
-        yield _issue(path, closer, f"{_word(closer)} closes no {_OPENERS[kinds[0]]}")
+def _close(path: str, opened: list[Statement], closer: Statement, indented: bool) -> Iterator[Issue]:
+    depth = _partner(opened, closer, _CLOSERS[closer.kind], indented)
+    if depth is None:
+        yield _issue(path, closer, f"{_word(closer)} closes no {_OPENERS[_CLOSERS[closer.kind][0]]}")
         return
     yield from _unclosed(path, opened[depth + 1 :])
     del opened[depth:]
+
+
+def _inner(path: str, opened: list[Statement], statement: Statement, indented: bool) -> Iterator[Issue]:
+    """Check that ELSE, CASE and DEFAULT stand in their block; what is open within it ends there."""
+    kind = _INNER[statement.kind]
+    depth = _partner(opened, statement, (kind,), indented) if indented else len(opened) - 1
+    if depth is None or depth < 0 or opened[depth].kind != kind:
+        yield _issue(path, statement, f"{_word(statement)} stands in no {_OPENERS[kind]}")
+        return
+    yield from _unclosed(path, opened[depth + 1 :])
+    del opened[depth + 1 :]
+
+
+def _partner(opened: list[Statement], closer: Statement, kinds: tuple[str, ...], indented: bool) -> int | None:
+    """Position of the block that a statement closes or divides."""
+    fitting = [index for index, statement in enumerate(opened) if statement.kind in kinds]
+    if not fitting:
+        return None
+    if indented:
+        column = _column(closer)
+        same = [index for index in fitting if _column(opened[index]) == column]
+        if same:
+            return same[-1]
+        if closer.kind not in ("end_routine", "end_data_list") and _column(opened[fitting[-1]]) < column:
+            return None  # what it closes stood deeper and is gone
+    return fitting[-1]
 
 
 def _unclosed(path: str, opened: list[Statement]) -> Iterator[Issue]:
@@ -152,4 +194,12 @@ def _name(statement: Statement) -> str:
 
 
 def _issue(path: str, statement: Statement, message: str) -> Issue:
-    return Issue("UNBALANCED_BLOCK", message, path, statement.line, 1, statement.source)
+    column = _column(statement)
+    excerpt = statement.text[statement.start - column + 1 : statement.end]
+    return Issue("UNBALANCED_BLOCK", message, path, statement.line, column, excerpt)
+
+
+def _column(statement: Statement) -> int:
+    """Column of a statement, from 1."""
+    text, start = statement.text, statement.start
+    return start - max(text.rfind("\n", 0, start), text.rfind("\r", 0, start))

@@ -6,8 +6,8 @@ import re
 from itertools import count
 
 from respot.languages.shapes import LONGEST_STATEMENT, Cache, Shapes
-from respot.program.statement import Shape, Statement
-from respot.source import Span
+from respot.program.statement import OPAQUE, Shape, Statement
+from respot.source import NEWLINE, Span
 
 ENCODINGS = ("cp1252", "latin-1")
 
@@ -93,14 +93,39 @@ def _shape(text: str) -> Shape:
     return parts[0].shape if parts else _PLAIN[COMMENT]
 
 
-_FIRST_WORD = re.compile(r"(?:GLOBAL\s+)?(?:DEF|DEFFCT|DEFDAT)\b", re.IGNORECASE)
+#: A file whose first statement is one of these is KRL, whatever follows.
+_HEADS = frozenset(("routine", "function", "data_list"))
+#: What other languages' lines read as by chance.
+_COMMON = frozenset(
+    (OPAQUE, COMMENT, "header", "assignments", "call", "label", "if_", "else_", "while_", "return_", "loop")
+)
+_DEF = re.compile(r"(?:GLOBAL\s+)?DEF(?:FCT|DAT)?\b", re.IGNORECASE)
+_SNIFFED_STATEMENTS = 300
+_SNIFFED_TEXT = 100_000
 
 
 def looks_like_krl(text: str) -> bool:
-    """Whether a file with the suffix of KRL holds KRL."""
-    for line in text.splitlines():
-        line = line.strip()
-        if not line or line[0] in ";&":
+    """Whether a file with a suffix of KRL holds KRL: other systems use ``.src`` and ``.dat`` too.
+
+    A file that begins with a DEF does, after its ``&`` lines; if the DEF itself is damaged, most of the rest must be
+    known. A fragment does if nine in ten of its first statements are known, some of them are no common ones, and most do
+    not end with a semicolon as in C. An empty file does as well.
+    """
+    beginning = text[:_SNIFFED_TEXT]
+    known = ended = total = 0
+    telling, share = False, 0.9
+    starts = [0, *(match.end() for match in NEWLINE.finditer(beginning))]
+    for statement in read_statements(beginning, starts):
+        telling |= statement.kind not in _COMMON
+        if statement.kind in NO_STATEMENT or statement.kind == "header":
             continue
-        return _FIRST_WORD.match(line) is not None
-    return False
+        if total == 0 and statement.kind in _HEADS:
+            return True
+        if total == 0 and _DEF.match(statement.source):
+            share = 0.6
+        total += 1
+        known += statement.kind != OPAQUE
+        ended += statement.source.endswith(";")
+        if total == _SNIFFED_STATEMENTS:
+            break
+    return total == 0 or (telling and known >= share * total and ended <= 0.5 * total)

@@ -293,9 +293,12 @@ def _match(blocks: list[tuple[str, Statement]], indented: bool) -> list[_Fault]:
     faults: list[_Fault] = []
     opened: list[tuple[str, Statement]] = []
     last: set[int] = set()  # blocks that have had their ELSE or DEFAULT, by the start of their head
+    compact: list[Statement] = []
     for kind, statement in blocks:
         if kind in BLOCKS:
             opened.append((kind, statement))
+        elif kind == "compact_if":
+            compact.append(statement)
         elif kind in SECTIONS:
             faults += [_not_closed(head, BLOCKS[opener]) for opener, head in opened]
             opened.clear()
@@ -303,6 +306,11 @@ def _match(blocks: list[tuple[str, Statement]], indented: bool) -> list[_Fault]:
             closing = kind in _BLOCK_ENDS
             wanted = _BLOCK_ENDS[kind] if closing else DIVIDERS[kind]
             index = _partner(opened, wanted, statement, indented)
+            if index is None and wanted == "if_" and (meant := _without_then(compact, statement)) is not None:
+                faults.append(_Fault(meant, "IF without THEN"))
+                if not closing:
+                    opened.append((wanted, meant))
+                continue
             if index is None:
                 faults.append(_Fault(statement, f"{_WORDS[kind]} without {_WORDS[wanted]}"))
                 continue
@@ -334,6 +342,15 @@ def _partner(opened: list[tuple[str, Statement]], wanted: str, statement: Statem
     return None if column > columns[candidates[-1]] else candidates[-1]
 
 
+def _without_then(compact: list[Statement], statement: Statement) -> Statement | None:
+    """Return the compact IF over several lines that is meant as the head of a block: what needs it stands below it."""
+    column = _indentation(statement)
+    found = next((head for head in reversed(compact) if _indentation(head) == column), None)
+    if found is not None:
+        compact.remove(found)
+    return found
+
+
 def _indentation(statement: Statement) -> int:
     text, start = statement.text, statement.start
     begin = max(text.rfind("\n", 0, start), text.rfind("\r", 0, start)) + 1
@@ -345,6 +362,8 @@ def _block_kind(statement: Statement) -> str:
     kind = statement.kind
     if kind == OPAQUE:
         kind = _opaque_kind(statement)
+    if kind == "compact_if":
+        return kind if "\n" in statement.source or "\r" in statement.source else ""
     return kind if kind in BLOCKS or kind in _BLOCK_ENDS or kind in DIVIDERS or kind in SECTIONS else ""
 
 

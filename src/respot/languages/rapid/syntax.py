@@ -55,6 +55,7 @@ _STORAGE = _words("VAR PERS CONST")
 _HEADS = _words("PROC FUNC")
 #: Words that begin a simple statement; a compact IF may stand before them.
 _JUMPS = _words("RETURN GOTO RAISE EXIT RETRY TRYNEXT CONNECT")
+_WHOLE_JUMPS = _words("EXIT RETRY TRYNEXT")
 #: Words that stand nowhere but at the beginning of a statement.
 _FIRST = (
     _WHOLE
@@ -178,6 +179,8 @@ _TWO_OPERANDS = re.compile(
 _ASSIGNS = re.compile(r"[^\W\d]\w*(?:\s*\{[^}]*\}|\s*\.\s*[^\W\d]\w*)*\s*:=", re.IGNORECASE)
 #: Characters that hold the type and the name of a parameter.
 _LONGEST_PARAMETER = 400
+#: So many tokens tell what a statement is.
+_FIRST_WORDS = 3
 #: Tries at closing one head; more are only met in a file made to stall the reader.
 _MOST_TRIES = 50
 
@@ -286,7 +289,8 @@ class _Reader:
                 self._go_on(self._begun, line, start, stop)
                 return
             self._cut()
-        if line.startswith("%%%") and self._header(start, number):
+        if line.startswith("%%%"):
+            self._header(start, stop, number)
             return
         if line[0] == "(" and self._statements and self._statements[-1].kind in ("module", "error"):
             head = self._statements.pop()
@@ -302,15 +306,13 @@ class _Reader:
         if len(line) > LONGEST_STATEMENT and _has_semicolon(line):
             self._add_long(self._begun)
 
-    def _header(self, start: int, number: int) -> bool:
+    def _header(self, start: int, stop: int, number: int) -> None:
+        """Take the lines of a file header, or its first line where it is not closed."""
         header = _HEADER.match(self._text, start)
-        if header is None:
-            return False
-        end = self._line_end(header.end())
-        self._begun = _Begun(start, end, number, ())
-        self._header_end = end
+        if header is not None:
+            stop = self._header_end = self._line_end(header.end())
+        self._begun = _Begun(start, stop, number, ())
         self._cut()
-        return True
 
     def _line_end(self, offset: int) -> int:
         index = bisect_right(self._line_starts, offset)
@@ -326,6 +328,8 @@ class _Reader:
                 self._add_long(begun)
             return
         if not _MAY_END.search(line) or not _holds_end(begun, SHAPES.kinds(line)[0]):
+            if len(begun.words) < _FIRST_WORDS:
+                begun.words = (*begun.words, *_first_words(line))[:_FIRST_WORDS]
             return
         begun.tries += 1
         parts = SHAPES.read(self._text[begun.start : stop])
@@ -353,6 +357,9 @@ class _Reader:
             return True
         kinds = self._last_kinds(begun)
         before = kinds[-1]
+        alone = begun.last in (begun.start, begun.joined) and len(kinds) == 1
+        if alone and before in _JUMPS:
+            return before in _WHOLE_JUMPS or self._column(start) <= self._column(begun.last)
         if not _is_operand(before):
             return not compact and before not in _BEFORE_TYPE and _begins_anyway(line, before)
         if compact:
@@ -360,7 +367,7 @@ class _Reader:
             return False
         if begun.words[0] in _BEFORE_TYPE and len(begun.words) == 2:
             return False
-        if begun.last in (begun.start, begun.joined) and len(kinds) == 1:
+        if alone:
             # a procedure without arguments and no `;`, or one whose arguments stand in the next line: further right
             return self._column(start) <= self._column(begun.last)
         return True
@@ -423,13 +430,13 @@ class _Reader:
 
 
 def _first_words(line: str) -> tuple[str, ...]:
-    """Up to three tokens that begin a line, in upper case, modifiers left out."""
+    """First tokens of a line, in upper case, modifiers left out."""
     words: list[str] = []
     for match in TOKEN.finditer(line, 0, LONGEST_STATEMENT):
         word = match.group().upper()
         if match.lastgroup != "comment" and (words or word not in _MODIFIERS):
             words.append(word)
-            if len(words) == 3:
+            if len(words) == _FIRST_WORDS:
                 break
     return tuple(words)
 
