@@ -47,7 +47,9 @@ class Arm:
     def forward(self, q):
         s = -1.0 if self.kuka else 1.0
         upper = along(x=self.upper) if self.kuka else along(z=self.upper)
-        arm = product(along(z=self.height), turn("z", s * q[0]), along(x=self.a1), turn("y", q[1]), upper, turn("y", q[2]))
+        arm = product(
+            along(z=self.height), turn("z", s * q[0]), along(x=self.a1), turn("y", q[1]), upper, turn("y", q[2])
+        )
         hand = product(along(x=self.fore, z=self.up), turn("x", s * q[3]), turn("y", q[4]), turn("x", s * q[5]))
         return product(arm, hand, along(x=self.flange), turn("y", 90))
 

@@ -29,7 +29,7 @@ def test_loads_are_the_slope_of_the_energy(robot):
     moments = np.column_stack([weights, weights[:, None] * centres])
     loads = np.einsum("jkc,kc->j", gravity_basis(robot, joints, gravity)[0], moments)
     for axis in range(robot.axes):
-        step = (np.radians(1e-3) if robot.revolute[axis] else 1e-3)
+        step = np.radians(1e-3) if robot.revolute[axis] else 1e-3
         change = 1e-3 * np.eye(robot.axes)[axis]
         up, down = (potential(robot, joints + s * change, gravity, weights, centres) for s in (1, -1))
         assert loads[axis] == pytest.approx(-(up - down) / (2 * step), rel=1e-6, abs=1e-3)

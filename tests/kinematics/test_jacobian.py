@@ -9,9 +9,14 @@ from respot.kinematics.dh import DhRobot, Link
 from respot.kinematics.robots import built_in_robots
 
 GANTRY = DhRobot(
-    name="gantry", links=(Link(0, -90, 500, 0, True), Link(0, 90, 300, 90, True), Link(150, 20, 100, 10), Link(80, -70, 40))
+    name="gantry",
+    links=(Link(0, -90, 500, 0, True), Link(0, 90, 300, 90, True), Link(150, 20, 100, 10), Link(80, -70, 40)),
 )
-CRAIG = DhRobot(name="craig", modified=True, links=(Link(0, 0, 300), Link(100, -90, 0, -90), Link(400, 0, 20), Link(50, 90, 0, 0, True)))
+CRAIG = DhRobot(
+    name="craig",
+    modified=True,
+    links=(Link(0, 0, 300), Link(100, -90, 0, -90), Link(400, 0, 20), Link(50, 90, 0, 0, True)),
+)
 ROBOTS = [row.model for row in built_in_robots().values()] + [GANTRY, CRAIG]
 
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from respot.registration.alternatives import fit_affine, fit_translation
-from respot.registration.covariance import leverage, unit_covariance
+from respot.registration.covariance import jacobian, leverage, unit_covariance
 from respot.registration.errors import DegenerateError, RegistrationError
 from respot.registration.leave_one_out import leave_one_out
 from respot.registration.rigid import fit_rigid, transform_of
@@ -205,6 +205,15 @@ def test_a_true_null_rotation_is_claimed_about_one_time_in_twenty():
         by_axis += rotation_p_value_by_axis(source, source + error * [1, 9, 3] + 60.0) < 0.05
     assert claims <= 0.08 * 300
     assert 0.02 * 300 <= by_axis <= 0.09 * 300
+
+
+def test_jacobian_is_the_derivative_of_a_small_motion(points):
+    offsets = np.array([[100.0, -20, 35], [3, 700, -60]])
+    degrees = 1e-4
+    for k, axis in enumerate([(1, 0, 0), (0, 1, 0), (0, 0, 1)]):
+        moved = points.move(offsets, points.turn(axis, degrees), (0, 0, 0))
+        np.testing.assert_allclose(jacobian(offsets)[:, :, 3 + k], (moved - offsets) / np.radians(degrees), atol=1e-2)
+        np.testing.assert_allclose(jacobian(offsets)[:, :, k], np.tile(axis, (2, 1)))
 
 
 def test_covariance_predicts_the_scatter_of_the_transform():

@@ -138,7 +138,7 @@ def align(
         transitions=_transitions(scope, {id(item.target) for item in moving}, refused_programs),
         files=_changed_files(robot, language, options, edits, header),
         reconfigured=all(id(item) in configured for item in moving if language.has_configuration(item.target)),
-        issues=_issues(robot, moving, spot_moves, edits),
+        issues=_issues(robot, scope, moving, spot_moves, edits),
     )
 
 
@@ -286,12 +286,17 @@ def _transitions(scope: Scope, moved: set[int], refused_programs: frozenset[str]
 
 def _issues(
     robot: Robot,
+    scope: Scope,
     moving: Sequence[Moving],
     spot_moves: Sequence[Move],
     edits: Sequence[PointEdit],
 ) -> list[Issue]:
     issues = [Issue("NOT_CHECKED", "collisions are never checked: simulate or step through the programs before use")]
     issues += [Issue("NOT_CHECKED", note) for note in notes_of(robot)]
+    left = [stay.target.name for stay in scope.stays if stay.code == "SAME_BASE_STAYS"]
+    if left:
+        message = f"{', '.join(left[:10])}{' ...' if len(left) > 10 else ''}: no routine that belongs to a matched spot goes there"
+        issues.append(Issue("SAME_BASE_STAYS", f"{message}; --programs takes their programs in"))
     issues += _extrapolated(moving, spot_moves)
     for path in dict.fromkeys(edit.path for edit in edits):
         if LANGUAGES[robot.language].header_place(robot.files[path]) is None:

@@ -2,7 +2,7 @@
 
 cf1, cf4, cf6: quadrant of axes 1, 4 and 6, floor(angle / 90): 0 is [0, 90), -1 is [-90, 0). cfx = 4 where the wrist
 centre lies behind axis 1, plus 2 where it lies behind the lower arm, plus 1 where axis 5 is negative. Robots with a
-parallel linkage do not use cfx: it is kept.
+parallel linkage do not use cfx: it is kept, and their forearm stays in front of the lower arm.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from respot.geometry import Array
 from respot.kinematics.opw import OpwRobot
-from respot.kinematics.posture import posture
+from respot.kinematics.posture import ELBOW, posture
 from respot.kinematics.turns import TURNS
 
 Integers = npt.NDArray[np.int64]
@@ -53,21 +53,22 @@ def confdata(
     return np.column_stack([quadrants, old[:, 3] if model.coupled_23 else cfx]).astype(np.int64)
 
 
-def posture_matches(model: OpwRobot, joints: Array, old: Integers, tolerance: float) -> Bools:
+def posture_matches(model: OpwRobot, joints: Array, old: Integers, tolerance: Array) -> Bools:
     """Whether solutions (n, b, 6) have the cfx of ``old`` (n, 4); shape (n, b)."""
-    if model.coupled_23:
-        return np.asarray(np.isfinite(joints).all(axis=-1))
     distances = posture(model, joints)
+    if model.coupled_23:
+        # the linkage does not let the forearm pass the stretched arm
+        return np.asarray(distances[..., ELBOW] >= -tolerance[..., 0])
     bits = (old[:, None, 3:] & _WEIGHTS) > 0
     return np.asarray((((distances < 0.0) == bits) | (np.abs(distances) <= tolerance)).all(axis=-1))
 
 
-def turn_matches(joints: Array, old: Integers, tolerance: float) -> Bools:
+def turn_matches(joints: Array, old: Integers, tolerance: Array) -> Bools:
     """Whether angles (n, b, 6) plus each of `TURNS` lie in the quadrants of ``old`` (n, 4); shape (n, b, 6, turns)."""
     angles = joints[..., None] + TURNS
     matches = np.ones(angles.shape, dtype=bool)
     quadrants = old[:, None, :3, None]
-    matches[..., COUNTED, :] = _in_quadrant(angles[..., COUNTED, :], quadrants, tolerance)
+    matches[..., COUNTED, :] = _in_quadrant(angles[..., COUNTED, :], quadrants, tolerance[..., None])
     return matches
 
 
@@ -90,5 +91,5 @@ def text(configuration: npt.ArrayLike) -> str:
     return "[" + ",".join(str(number) for number in np.asarray(configuration).tolist()) + "]"
 
 
-def _in_quadrant(angles: Array, quadrants: npt.NDArray[np.int64], tolerance: float) -> Bools:
+def _in_quadrant(angles: Array, quadrants: Integers, tolerance: Array | float) -> Bools:
     return np.asarray((angles >= 90.0 * quadrants - tolerance) & (angles < 90.0 * (quadrants + 1) + tolerance))

@@ -34,10 +34,10 @@ ACCURATE = 0.5
 class Scheme(Protocol):
     """What a language's module offers: `respot.kinematics.status_turn`, `respot.kinematics.confdata`."""
 
-    def posture_matches(self, model: OpwRobot, joints: Array, old: Integers, tolerance: float) -> Bools:
+    def posture_matches(self, model: OpwRobot, joints: Array, old: Integers, tolerance: Array) -> Bools:
         """Whether solutions have the old branch."""
 
-    def turn_matches(self, joints: Array, old: Integers, tolerance: float) -> Bools:
+    def turn_matches(self, joints: Array, old: Integers, tolerance: Array) -> Bools:
         """Whether angles plus full turns have the old turns."""
 
     def undefined(self, old: Integers) -> Bools:
@@ -139,7 +139,11 @@ def reconfigure(
     if len(reached):
         result[reached] = configuration_of(cell, joints[reached], old[reached])
     for row in rows:
-        found[row] = _objection(cell, model, new_tool2world, tool2flange, joints[row], old_joints[row], int(row))
+        found[row] = (
+            _unreached(cell, model, new_tool2world, tool2flange, int(row))
+            if not np.isfinite(joints[row]).all()
+            else _objection(cell, model, joints[row], old_joints[row], old[row])
+        )
     refused = np.array([reason is not None for reason in found])
     result[refused] = old[refused]
     return Reconfiguration(result, joints, old_joints, tuple(found))
@@ -153,6 +157,12 @@ def _refused(cell: RobotCell) -> Reason | None:
     if cell.on_track:
         return Reason("CONFIG_NOT_CHECKED", f"{name} stands on an external axis: its base is not known for each target")
     return None
+
+
+def _accurate(cell: RobotCell, old: Integers) -> Bools:
+    """Whether each target belongs to an absolutely accurate robot; KUKA writes it into bit 4 of the status."""
+    marked = (old[:, 0] & 16) > 0 if cell.language == "krl" else np.zeros(len(old), dtype=bool)
+    return np.asarray(marked | cell.absolute_accuracy)
 
 
 def _scheme(cell: RobotCell) -> Scheme:
@@ -178,7 +188,7 @@ def _taught(
 ) -> tuple[Array, tuple[Reason | None, ...]]:
     """Solution of each taught point that has its old numbers."""
     scheme = _scheme(cell)
-    tolerance = ACCURATE if cell.absolute_accuracy else TAUGHT
+    tolerance = np.where(_accurate(cell, old), ACCURATE, TAUGHT)[:, None, None]
     exists: Bools = np.asarray(np.isfinite(branches).all(axis=-1))
     fits = exists & scheme.posture_matches(model, branches, old, tolerance)
     angles, turned = chosen_turn(
@@ -232,21 +242,18 @@ def _nearest(model: OpwRobot, branches: Array, old_joints: Array) -> Array:
     return np.asarray(turned[np.arange(len(best)), best])
 
 
-def _objection(
-    cell: RobotCell,
-    model: OpwRobot,
-    tool2world: RigidTransform,
-    tool2flange: RigidTransform,
-    joints: Array,
-    old_joints: Array,
-    row: int,
-) -> Reason | None:
+def _unreached(
+    cell: RobotCell, model: OpwRobot, tool2world: RigidTransform, tool2flange: RigidTransform, row: int
+) -> Reason:
+    """Say why a moved target has no joints."""
+    pose, tool = (poses if poses.single else poses[row] for poses in (tool2world, tool2flange))
+    if not np.isfinite(pose.translation).all():
+        return Reason("OUT_OF_REACH", "the moved pose is not a number")
+    return Reason("OUT_OF_REACH", f"out of reach: {model.reach_text(cell.flange2base(pose, tool))}")
+
+
+def _objection(cell: RobotCell, model: OpwRobot, joints: Array, old_joints: Array, old: Integers) -> Reason | None:
     """Say why a moved target must not be written with these joints."""
-    if not np.isfinite(joints).all():
-        pose, tool = (poses if poses.single else poses[row] for poses in (tool2world, tool2flange))
-        if not np.isfinite(pose.translation).all():
-            return Reason("OUT_OF_REACH", "the moved pose is not a number")
-        return Reason("OUT_OF_REACH", f"out of reach: {model.reach_text(cell.flange2base(pose, tool))}")
     beyond = outside(joints, cell.limits)
     if cell.limits is not None and beyond.max() > 0.0:
         axis = int(np.argmax(beyond))
@@ -256,12 +263,12 @@ def _objection(
             f"axis {axis + 1} would stand at {joints[axis]:.3f} deg, outside its limits {low:g} .. {high:g} "
             f"(before: {old_joints[axis]:.3f})",
         )
-    if cell.absolute_accuracy:
-        margins = _scheme(cell).margins(model, joints[None])[0]
-        if margins.min() < ACCURATE:
+    if _accurate(cell, old[None])[0]:
+        margin = float(_scheme(cell).margins(model, joints[None]).min())
+        if margin < ACCURATE:
             return Reason(
                 "CONFIG_NOT_CHECKED",
-                f"an absolutely accurate robot {margins.min():.2f} deg from a change of its configuration: "
+                f"an absolutely accurate robot {margin:.2f} deg from a change of its configuration: "
                 "joints from nominal lengths cannot decide it",
             )
     return None

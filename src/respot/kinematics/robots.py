@@ -37,7 +37,8 @@ def built_in_robots() -> dict[str, BuiltIn]:
 
 def _robot(row: dict[str, object]) -> BuiltIn:
     source, commit, note = (str(row.get(key, "")) for key in ("source", "commit", "note"))
-    fields = {key: row[key] for key in (*LENGTHS, "name", "signs", "offsets_deg")}
+    fields = {key: row[key] for key in (*LENGTHS, "name")}
+    fields |= {key: tuple(row[key]) for key in ("signs", "offsets_deg")}  # type: ignore[arg-type]
     origin = f"{source} {commit}".strip()
     model = OpwRobot(**fields, coupled_23=bool(row.get("coupled_23")), source=origin)  # type: ignore[arg-type]
     return BuiltIn(model, source, commit, note)

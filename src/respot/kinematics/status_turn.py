@@ -46,18 +46,18 @@ def status_turn(
     return np.stack([old[:, 0] & ~_STATUS | status, old[:, 1] & ~_TURN | turn], axis=1)
 
 
-def posture_matches(model: OpwRobot, joints: Array, old: Integers, tolerance: float) -> Bools:
+def posture_matches(model: OpwRobot, joints: Array, old: Integers, tolerance: Array) -> Bools:
     """Whether solutions (n, b, 6) have the status of ``old`` (n, 2); shape (n, b)."""
     distances = _status_distances(model, joints)
     bits = old[:, None, :1] >> np.arange(3) & 1
     return np.asarray((((distances < 0.0) == (bits == 1)) | (np.abs(distances) <= tolerance)).all(axis=-1))
 
 
-def turn_matches(joints: Array, old: Integers, tolerance: float) -> Bools:
+def turn_matches(joints: Array, old: Integers, tolerance: Array) -> Bools:
     """Whether angles (n, b, 6) plus each of `TURNS` have the turn bits of ``old`` (n, 2); shape (n, b, 6, turns)."""
     angles = joints[..., None] + TURNS
     bits = (old[:, 1:] >> np.arange(6) & 1)[:, None, :, None]
-    return np.asarray(((angles < 0.0) == (bits == 1)) | (np.abs(angles) <= tolerance))
+    return np.asarray(((angles < 0.0) == (bits == 1)) | (np.abs(angles) <= tolerance[..., None]))
 
 
 def undefined(old: Integers) -> Bools:

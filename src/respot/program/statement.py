@@ -1,8 +1,8 @@
 """Statements as they stand in a file: spans of the text and, on demand, a tree over them.
 
 Thousands of statements of a program differ only in numbers, names and strings. They share one `Shape`, which holds the
-tree once with token positions in place of text; a `Node` is that tree laid over one statement's own tokens. A shape also
-makes one pattern from its tokens, so that a single match finds the place of every token, or of every number, at once.
+tree once with token positions in place of text; a `Node` is that tree laid over one statement's own tokens. A shape
+also makes one pattern from its tokens, so that a single match finds the place of every token, or of every number.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from respot.source import Span
 
 #: Kind of a statement that no rule of the grammar knows.
 OPAQUE = "opaque"
-#: A statement of more tokens is searched token by token, and so are the first few statements of a shape: making a pattern
-#: costs as much as some hundred searches.
+#: A statement of more tokens is searched token by token, and so are the first few statements of a shape: making a
+#: pattern costs as much as some hundred searches.
 _MOST_GROUPS = 500
 _RARE = 20
 

@@ -79,7 +79,7 @@ def rotation_support(source: ArrayLike, reference: ArrayLike, *, seed: int = 0) 
         verdict = f"the data do not support a rotation: translation alone does as well (p = {p_value:.2g}; {loo})"
         if by_axis < SIGNIFICANCE:
             verdict += (
-                f"; but weighed by the noise of each direction a rotation shows (p = {by_axis:.2g}): it is small beside "
+                f"; but weighed by the noise of each direction a rotation shows (p = {by_axis:.2g}): small beside "
                 "the scatter in the widest direction"
             )
     return RotationSupport(f_value, p_value, by_axis, translation_loo, rigid_loo, angle, supported, verdict)

@@ -160,7 +160,7 @@ def _partner(opened: list[Statement], closer: Statement, kinds: tuple[str, ...],
         same = [index for index in fitting if _column(opened[index]) == column]
         if same:
             return same[-1]
-        if closer.kind not in ("end_routine", "end_data_list") and _column(opened[fitting[-1]]) < column:
+        if closer.kind in _CLOSERS and opened[fitting[-1]].kind not in _HEADS and _column(opened[fitting[-1]]) < column:
             return None  # what it closes stood deeper and is gone
     return fitting[-1]
 

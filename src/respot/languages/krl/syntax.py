@@ -108,8 +108,8 @@ def looks_like_krl(text: str) -> bool:
     """Whether a file with a suffix of KRL holds KRL: other systems use ``.src`` and ``.dat`` too.
 
     A file that begins with a DEF does, after its ``&`` lines; if the DEF itself is damaged, most of the rest must be
-    known. A fragment does if nine in ten of its first statements are known, some of them are no common ones, and most do
-    not end with a semicolon as in C. An empty file does as well.
+    known. A fragment does if nine in ten of its first statements are known, some of them are no common ones, and most
+    do not end with a semicolon as in C. An empty file does as well.
     """
     beginning = text[:_SNIFFED_TEXT]
     known = ended = total = 0

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 
-from respot.languages.shapes import Part, Shapes, Splitter
+from respot.languages.shapes import Part, Shapes, Splitter, Unit
 from respot.program.statement import OPAQUE, Branch, Leaf, Shape
 from respot.source import Span
 
@@ -74,17 +74,37 @@ class RapidShapes(Shapes):
             first = last + 1
         return tuple(parts)
 
-    def _parse(self, text: str, spans: list[Span], kinds: tuple[str, ...]) -> Shape:
-        taken = literal_aggregates(kinds)
-        kept = _kept(len(kinds), taken)
-        if len(kept) == len(kinds):
-            return super()._parse(text, spans, kinds)
-        words = [text[slice(*spans[position])] for position in kept]
-        short = self._shape(" ".join(words), [kinds[position] for position in kept], 0, len(kept) - 1)
+    def read_table(self, text: str) -> Unit:
+        """Read one long statement as `read` does, without a list of all its words."""
+        kinds = [kind for match in self._words.finditer(text) if (kind := self._kinds[match.group()])]
+        if self._end(kinds, 0) != len(kinds) - 1:
+            return None
+        return (Part(0, len(kinds) - 1, self._shape(text, kinds, 0, len(kinds) - 1)),)
+
+    def _shape(self, text: str, kinds: list[str], first: int, last: int) -> Shape:
+        key = tuple(kinds) if last - first == len(kinds) - 1 else tuple(kinds[first : last + 1])
+        shape = self._parts.get(key)
+        if shape is None:
+            taken = literal_aggregates(key)
+            kept = _kept(len(key), taken)
+            if len(kept) == len(key):
+                return super()._shape(text, kinds, first, last)
+            shape = self._parts[key] = self._laid(self._without(text, first, kept), key, kept, dict(taken))
+        return shape
+
+    def _without(self, text: str, first: int, kept: list[int]) -> Shape:
+        """Shape of a statement of which only some tokens are kept."""
+        wanted = {first + position for position in kept}
+        tokens = (token for match in self._words.finditer(text) if self._kinds[token := match.group()])
+        words = [token for position, token in enumerate(tokens) if position in wanted]
+        return super()._shape(" ".join(words), list(map(self._kinds.__getitem__, words)), 0, len(words) - 1)
+
+    def _laid(self, short: Shape, kinds: tuple[str, ...], kept: list[int], taken: dict[int, int]) -> Shape:
+        """Shape of a statement from that of what is kept of it."""
         if short.tree is None:
             fault = None if short.fault is None else kept[short.fault]
             return Shape(OPAQUE, None, short.reason, short.lexicon, kinds, fault)
-        tree = _lay(short.tree, kept, dict(taken), kinds)
+        tree = _lay(short.tree, kept, taken, kinds)
         return Shape(tree.kind, tree, "", short.lexicon, kinds)
 
 

@@ -23,6 +23,7 @@ TOKEN = re.compile(
     | (?P<name>[^\W\d]\w*)
     | (?P<number>0[xX][0-9A-Fa-f]+|0[oO][0-7]+|0[bB][01]+|(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)
     | (?P<string>"(?:[^"\r\n]|"")*")
+    | (?P<quote>")
     | %%%[^%]*%%%
     | <(?:TDN|DDN|RDN|PAR|ALT|DIM|SMT|VAR|EIT|CSE|EXP|ARG|ID)>
     | := | <> | <= | >=
@@ -32,7 +33,7 @@ TOKEN = re.compile(
 )
 
 #: A declaration is read up to this length: a program generator may write ten thousand targets in one.
-LONGEST_TABLE = 16 * 1024 * 1024
+LONGEST_TABLE = 4 * 1024 * 1024
 
 COMMENT, AFTER_MODULE = "comment", "after_module"
 #: Kinds that count as no statement (INTERFACES, `check`).
@@ -292,19 +293,47 @@ class _Reader:
         if line.startswith("%%%"):
             self._header(start, stop, number)
             return
-        if line[0] == "(" and self._statements and self._statements[-1].kind in ("module", "error"):
-            head = self._statements.pop()
-            start, number = head.start, head.line
-            line = self._text[start:stop]
-            parts = None
+        if line[0] == "(":
+            head = self._head_without_list()
+            if head is not None:
+                start, number = head.start, head.line
+                line = self._text[start:stop]
+                parts = None
         if parts is None and len(line) <= LONGEST_STATEMENT:
             parts = SHAPES.read(line)
         if parts is not None:
             self._add(parts, start, stop)
             return
+        whole = self._whole(line)
+        if whole:
+            self._add(SHAPES.last(line[:whole]), start, start + len(line[:whole].rstrip(_BLANK)))
+            start, line = start + whole, line[whole:]
         self._begun = _Begun(start, stop, number, _first_words(line))
         if len(line) > LONGEST_STATEMENT and _has_semicolon(line):
             self._add_long(self._begun)
+
+    def _head_without_list(self) -> Statement | None:
+        """Take back the MODULE or ERROR whose list stands in a line of its own."""
+        index = len(self._statements) - 1
+        while index >= 0 and self._statements[index].kind == COMMENT:
+            index -= 1
+        if index < 0 or self._statements[index].kind not in ("module", "error"):
+            return None
+        head = self._statements[index]
+        if self._text[head.start : head.end].endswith(")"):
+            return None
+        del self._statements[index:]
+        return head
+
+    def _whole(self, line: str) -> int:
+        """Length of the whole statements of a line whose last one goes on."""
+        if len(line) > LONGEST_STATEMENT:
+            return 0
+        kinds, spans = SHAPES.kinds(line)
+        first = 0
+        while (last := _end(kinds, first)) is not None and last + 1 < len(kinds):
+            first = last + 1
+        return spans[first][0] if first else 0
 
     def _header(self, start: int, stop: int, number: int) -> None:
         """Take the lines of a file header, or its first line where it is not closed."""
@@ -327,17 +356,18 @@ class _Reader:
             if _has_semicolon(line):
                 self._add_long(begun)
             return
-        if not _MAY_END.search(line) or not _holds_end(begun, SHAPES.kinds(line)[0]):
-            if len(begun.words) < _FIRST_WORDS:
-                begun.words = (*begun.words, *_first_words(line))[:_FIRST_WORDS]
-            return
-        begun.tries += 1
-        parts = SHAPES.read(self._text[begun.start : stop])
-        if parts is not None:
-            self._begun = None
-            self._add(parts, begun.start, stop)
-        elif begun.tries > _MOST_TRIES:
-            self._cut()
+        if _MAY_END.search(line) and _holds_end(begun, SHAPES.kinds(line)[0]):
+            begun.tries += 1
+            parts = SHAPES.read(self._text[begun.start : stop])
+            if parts is not None:
+                self._begun = None
+                self._add(parts, begun.start, stop)
+                return
+            if begun.tries > _MOST_TRIES:
+                self._cut()
+                return
+        if len(begun.words) < _FIRST_WORDS:
+            begun.words = (*begun.words, *_first_words(line))[:_FIRST_WORDS]
 
     def _begins(self, begun: _Begun, line: str, start: int) -> bool:
         """Whether a line begins a statement although the one before it has not ended."""
@@ -359,7 +389,7 @@ class _Reader:
         before = kinds[-1]
         alone = begun.last in (begun.start, begun.joined) and len(kinds) == 1
         if alone and before in _JUMPS:
-            return before in _WHOLE_JUMPS or self._column(start) <= self._column(begun.last)
+            return before in _WHOLE_JUMPS or self._indentation(start) <= self._indentation(begun.last)
         if not _is_operand(before):
             return not compact and before not in _BEFORE_TYPE and _begins_anyway(line, before)
         if compact:
@@ -369,7 +399,7 @@ class _Reader:
             return False
         if alone:
             # a procedure without arguments and no `;`, or one whose arguments stand in the next line: further right
-            return self._column(start) <= self._column(begun.last)
+            return self._indentation(start) <= self._indentation(begun.last)
         return True
 
     def _leaves_head(self, begun: _Begun) -> bool:
@@ -385,8 +415,10 @@ class _Reader:
         begin = max(begun.last, begun.stop - LONGEST_STATEMENT)
         return SHAPES.kinds(self._text[begin : begun.stop])[0]
 
-    def _column(self, start: int) -> int:
-        return start - self._line_starts[bisect_right(self._line_starts, start) - 1]
+    def _indentation(self, offset: int) -> int:
+        begin = self._line_starts[bisect_right(self._line_starts, offset) - 1]
+        line = self._text[begin : offset + 1]
+        return len(line) - len(line.lstrip(_BLANK))
 
     def _cut(self) -> None:
         """End the statement that was begun, whole or not."""
@@ -411,7 +443,7 @@ class _Reader:
         """Take a statement that only a table of data may be: rows of literals are read in no time."""
         self._begun = None
         table = begun.words[:1] and begun.words[0] in _STORAGE and begun.stop - begun.start <= LONGEST_TABLE
-        parts = SHAPES.read(self._text[begun.start : begun.stop]) if table else None
+        parts = SHAPES.read_table(self._text[begun.start : begun.stop]) if table else None
         if parts is None:
             self._append(begun.start, begun.stop, _TOO_LONG)
         else:
@@ -450,6 +482,8 @@ def _is_operand(kind: str) -> bool:
 
 def _begins_anyway(line: str, before: str) -> bool:
     """Whether a line begins a statement although an operand is missing in the one before it."""
+    if before == ".":
+        return False
     if _TWO_OPERANDS.match(line):
         return True
     return before not in (",", "(", "\\", "%") and _ASSIGNS.match(line) is not None
