@@ -72,7 +72,9 @@ def test_nothing_below_the_command_line_prints_exits_or_reads_the_environment(pa
             called = ast.unparse(node.func)
             assert called not in {"print", "input", "exit", "sys.exit", "os._exit", "os.getenv"}, f"line {node.lineno}"
         if isinstance(node, ast.Attribute):
-            assert ast.unparse(node) not in {"os.environ", "sys.argv", "sys.stdout", "sys.stderr"}, f"line {node.lineno}"
+            assert ast.unparse(node) not in {"os.environ", "sys.argv", "sys.stdout", "sys.stderr"}, (
+                f"line {node.lineno}"
+            )
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.relative_to(PACKAGE).as_posix())

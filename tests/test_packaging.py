@@ -49,7 +49,10 @@ def clean_checkout(tmp_path_factory) -> Path:
 def built(clean_checkout) -> Path:
     for target in ("wheel", "sdist"):
         done = subprocess.run(
-            [sys.executable, "-m", "hatchling", "build", "-t", target], cwd=clean_checkout, capture_output=True, text=True
+            [sys.executable, "-m", "hatchling", "build", "-t", target],
+            cwd=clean_checkout,
+            capture_output=True,
+            text=True,
         )
         assert done.returncode == 0, done.stderr
     return clean_checkout / "dist"
@@ -83,7 +86,19 @@ def test_an_editable_install_finds_its_resources(clean_checkout, tmp_path):
     borrowed = [path for path in sys.path if path.endswith("site-packages")]
     (site / "borrowed.pth").write_text("\n".join(borrowed))
     done = subprocess.run(
-        [sys.executable, "-m", "pip", "--python", str(python), "install", "-q", "--no-deps", "--no-build-isolation", "-e", "."],
+        [
+            sys.executable,
+            "-m",
+            "pip",
+            "--python",
+            str(python),
+            "install",
+            "-q",
+            "--no-deps",
+            "--no-build-isolation",
+            "-e",
+            ".",
+        ],
         cwd=clean_checkout,
         capture_output=True,
         text=True,

@@ -86,8 +86,8 @@ def open_backup(path: Path) -> Backup:
     Raises
     ------
     BadInputError
-        ``CANNOT_READ`` if the path is missing or unreadable, ``UNSAFE_ARCHIVE`` if an entry would leave its folder, is a
-        link, differs from another in case only, or if the whole is too large.
+        ``CANNOT_READ`` if the path is missing or unreadable, ``UNSAFE_ARCHIVE`` if an entry would leave its folder, is
+        a link, differs from another in case only, or if the whole is too large.
     """
     try:
         if path.is_dir():

@@ -1,7 +1,7 @@
 """Issue records and the one table of their codes.
 
-Every doubt that respot has about a file, a target or a fit becomes an `Issue` with a code from `CODES`; nothing below the
-command line prints or exits. Input that makes an answer impossible raises `BadInputError`, which carries its issue.
+Every doubt that respot has about a file, a target or a fit becomes an `Issue` with a code from `CODES`; nothing below
+the command line prints or exits. Input that makes an answer impossible raises `BadInputError`, which carries its issue.
 """
 
 from __future__ import annotations

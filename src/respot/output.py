@@ -7,7 +7,6 @@ intended, and renamed in one step. An interrupt or an error leaves no half-writt
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import tempfile
 from collections.abc import Mapping
@@ -107,15 +106,15 @@ def write_backup(
 def _move(staging: Path, folder: Path) -> None:
     """Rename staging to the output folder; an old one goes away only when the new one is in place."""
     if not folder.exists():
-        os.replace(staging, folder)
+        staging.replace(folder)
         return
     old = Path(tempfile.mkdtemp(prefix=f".{folder.name}.old.", dir=folder.parent))
     try:
-        os.replace(folder, old)
+        folder.replace(old)
         try:
-            os.replace(staging, folder)
+            staging.replace(folder)
         except BaseException:
-            os.replace(old, folder)
+            old.replace(folder)
             raise
     finally:
         shutil.rmtree(old, ignore_errors=True)

@@ -65,9 +65,13 @@ def test_table(respot, tmp_path, name, command):
 
 def test_collinear_spots(respot, tmp_path):
     names = [line.split(",")[0] for line in GOOD[1:]]
-    source = table(tmp_path, "id,x,y,z", *(f"{name},{10 * row},0,0" for row, name in enumerate(names)), name="source.csv")
+    source = table(
+        tmp_path, "id,x,y,z", *(f"{name},{10 * row},0,0" for row, name in enumerate(names)), name="source.csv"
+    )
     reference = table(tmp_path, "id,x,y,z", *(f"{name},0,{10 * row},5" for row, name in enumerate(names)))
-    refused(respot("fit", source, "--theory", reference), tmp_path, "COLLINEAR_SPOTS", "rotation about", "not determined")
+    refused(
+        respot("fit", source, "--theory", reference), tmp_path, "COLLINEAR_SPOTS", "rotation about", "not determined"
+    )
 
 
 def test_a_missing_source(respot, tmp_path, theory):
@@ -149,7 +153,12 @@ def test_a_measured_reference_without_effects_has_nothing_to_write(respot, tmp_p
 
 @pytest.mark.parametrize(
     ("text", "words"),
-    [("{", "JSON"), ("[]", "object"), ('{"schema": "other/1"}', "schema"), ('{"schema": "respot.calibration/1"}', "lacks")],
+    [
+        ("{", "JSON"),
+        ("[]", "object"),
+        ('{"schema": "other/1"}', "schema"),
+        ('{"schema": "respot.calibration/1"}', "lacks"),
+    ],
 )
 def test_a_calibration_that_is_none(respot, tmp_path, text, words):
     (tmp_path / "cal.json").write_text(text)
@@ -199,7 +208,7 @@ def test_ctrl_c_while_writing_leaves_nothing(tmp_path, theory, name):
         [sys.executable, "-c", code], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
     assert process.stdout.readline() == "writing\n"
-    assert [path for path in tmp_path.iterdir()], "it was not writing"
+    assert list(tmp_path.iterdir()), "it was not writing"
     time.sleep(0.1)
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=30)
@@ -221,4 +230,4 @@ def test_what_is_written_is_read_back(respot, tmp_path, theory, monkeypatch):
     result = respot("convert", SAMPLES / "abb", "--theory", theory, "-o", "out")
     assert result.code == 3
     assert "RearDoor.mod" in result.err
-    assert not [path for path in tmp_path.iterdir()]
+    assert not list(tmp_path.iterdir())

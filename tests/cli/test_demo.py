@@ -30,7 +30,11 @@ def test_the_commands_shown_are_real(respot, tmp_path):
         arguments = shlex.split(command)[1:]
         arguments[arguments.index("-o") + 1] = f"again/{robot}"
         assert respot(*arguments).code == 0
-        made = {path.relative_to(tmp_path / "again"): path for path in (tmp_path / "again" / robot).rglob("*") if path.is_file()}
+        made = {
+            path.relative_to(tmp_path / "again"): path
+            for path in (tmp_path / "again" / robot).rglob("*")
+            if path.is_file()
+        }
         assert len(made) > len([path for path in (SAMPLES / robot).rglob("*") if path.is_file()])
         for name, path in made.items():
             if name.name != "respot.json":

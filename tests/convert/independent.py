@@ -89,7 +89,9 @@ def abb_points(root: Path) -> dict[str, Point]:
         used = dict(re.findall(r"^\s*(?:Move[LJ]|Spot[LJ]) (?:Offs\(|RelTool\()?(\w+)\b.*\\WObj:=(\w+)", live, re.M))
         found = [(name, body, used[name]) for name, body in re.findall(r"robtarget (\w+):=\[(.*)\];", live)]
         for number, (body, spot, wobj) in enumerate(
-            re.findall(r"(?:Move|Spot)[LJ] \[(\[.*?\],\[.*?\],\[.*?\],\[.*?\])\],\w+,(?:gun1,sd_)?(\w+),.*\\WObj:=(\w+)", live)
+            re.findall(
+                r"(?:Move|Spot)[LJ] \[(\[.*?\],\[.*?\],\[.*?\],\[.*?\])\],\w+,(?:gun1,sd_)?(\w+),.*\\WObj:=(\w+)", live
+            )
         ):
             found.append((spot if spot.startswith("P02") else f"inline{number}", body, wobj))
         for name, body, wobj in found:

@@ -62,7 +62,7 @@ def test_every_target_in_scope_is_the_transform_of_the_old_one(robot, converted)
         unit = np.radians(1.0) if robot.name == "kuka" else 2.0
         assert np.abs(made[:3, :3] - wanted[:3, :3]).max() <= 3 * unit * max(half[3:]), name
         assert min(decimals[:3]) >= 3 and min(decimals[3:]) >= (4 if robot.name == "kuka" else 7)
-        assert all(new_count >= len(text.partition(".")[2]) for new_count, text in zip(decimals, old[name].numbers))
+        assert all(new_count >= len(text.partition(".")[2]) for new_count, text in zip(decimals, old[name].numbers, strict=True))
         assert new[name].rest == old[name].rest  # external axes
 
 
@@ -113,7 +113,7 @@ def test_only_numbers_of_moved_targets_and_the_header_change(robot, converted):
         old_lines, new_lines = old.decode(robot.encoding).split("\r\n"), HEADER.sub("", text).split("\r\n")
         assert len(old_lines) == len(new_lines)
         moved = {edit["line"] for edit in record["edits"] if edit["path"] == path}
-        for number, (before, after) in enumerate(zip(old_lines, new_lines), 1):
+        for number, (before, after) in enumerate(zip(old_lines, new_lines, strict=True), 1):
             if number not in moved:
                 assert before == after
             else:

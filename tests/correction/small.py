@@ -98,7 +98,9 @@ def krl(body: str = "", data: str = "", after: str = "", more: dict[str, str] | 
     """Backup with the module ``weld`` that welds S1 to S4 under base 1, then runs ``body``."""
     src = "&ACCESS RVP\nDEF weld( )\n" + "".join(lin(name, weld=True) for name in SPOTS) + body + "END\n" + after
     dat = "&ACCESS RVP\nDEFDAT  WELD\n"
-    dat += "".join(krl_point(name, *krl_in_base1(place)) + fdat(name) for name, place in SPOTS.items()) + data + "ENDDAT\n"
+    dat += (
+        "".join(krl_point(name, *krl_in_base1(place)) + fdat(name) for name, place in SPOTS.items()) + data + "ENDDAT\n"
+    )
     program = "KRC/R1/Program/"
     files = {f"{program}weld.src": src, f"{program}weld.dat": dat, "KRC/R1/System/$config.dat": CONFIG}
     return {**files, **{program + name: text for name, text in (more or {}).items()}}

@@ -145,7 +145,10 @@ def test_one_point_under_two_bases_is_refused(tmp_path):
         ("IF A THEN\n$BASE=BASE_DATA[1]\nELSE\n$BASE=BASE_DATA[2]\nENDIF\n", False),
         ("IF A THEN\n$BASE=BASE_DATA[5]\nENDIF\n", False),
         ("IF A THEN\n$BASE=BASE_DATA[1]\nELSE\n$BASE=BASE_DATA[1]\nENDIF\n", True),
-        ("SWITCH A\nCASE 1\n$BASE=BASE_DATA[1]\nCASE 2\n$BASE=BASE_DATA[5]\nDEFAULT\n$BASE=BASE_DATA[1]\nENDSWITCH\n", False),
+        (
+            "SWITCH A\nCASE 1\n$BASE=BASE_DATA[1]\nCASE 2\n$BASE=BASE_DATA[5]\nDEFAULT\n$BASE=BASE_DATA[1]\nENDSWITCH\n",
+            False,
+        ),
         ("SWITCH A\nCASE 1\n$BASE=BASE_DATA[1]\nDEFAULT\n$BASE=BASE_DATA[1]\nENDSWITCH\n", True),
     ],
 )
@@ -158,13 +161,15 @@ def test_what_branches_set_differently_is_not_known_after_them(tmp_path, branche
 def test_a_moving_base_is_refused(tmp_path):
     files = krl(body=lin("P1"), data=krl_point("P1", 5, 6, 7) + fdat("P1", base=2))
     config = files["KRC/R1/System/$config.dat"]
-    moving = "MACHINE_FRAME_DAT[2]={MACH_DEF_INDEX 2,PARENT[] \" \",GEOMETRY[] \" \"}\nENDDAT"
+    moving = 'MACHINE_FRAME_DAT[2]={MACH_DEF_INDEX 2,PARENT[] " ",GEOMETRY[] " "}\nENDDAT'
     files["KRC/R1/System/$config.dat"] = config.replace("ENDDAT", moving)
     assert convert(tmp_path, files).refusals() == {("weld", "XP1", "UNKNOWN_FRAME")}
 
 
 def test_tool_side_operands_stay_and_the_first_operand_moves(tmp_path):
-    done = convert(tmp_path, krl(body=lin("P1", "XP1:{X 0,Y 0,Z -60,A 0,B 0,C 0}"), data=krl_point("P1", 5, 6, 7) + fdat("P1")))
+    done = convert(
+        tmp_path, krl(body=lin("P1", "XP1:{X 0,Y 0,Z -60,A 0,B 0,C 0}"), data=krl_point("P1", 5, 6, 7) + fdat("P1"))
+    )
     assert "XP1" in done.edited()
     assert "LIN XP1:{X 0,Y 0,Z -60,A 0,B 0,C 0}" in done.text("weld.src")
 
@@ -195,7 +200,9 @@ def test_a_point_shared_by_two_motions_moves_once(tmp_path):
 
 def test_a_local_point_hides_a_global_one(tmp_path):
     shared = "DEFDAT SHARED PUBLIC\n" + krl_point("P1", 10, 20, 30, kind="GLOBAL E6POS") + "ENDDAT\n"
-    done = convert(tmp_path, krl(body=lin("P1"), data=krl_point("P1", 5, 6, 7) + fdat("P1"), more={"shared.dat": shared}))
+    done = convert(
+        tmp_path, krl(body=lin("P1"), data=krl_point("P1", 5, 6, 7) + fdat("P1"), more={"shared.dat": shared})
+    )
     assert done.code == 0, done.err
     assert done.text("shared.dat") == shared.replace("\n", "\r\n")
 

@@ -148,7 +148,7 @@ def test_a_target_handed_to_an_unknown_routine_is_refused(tmp_path):
     routine = "  PROC rGo(robtarget p)\n    MoveL p,v100,z10,tGun\\WObj:=wDoor;\n  ENDPROC\n"
     done = run(tmp_path, rapid(body="    rGo p1;\n", data=P1, after=routine))
     assert done.code == 1
-    assert {code for _, _, code in done.refusals()} == {"RUN_TIME_POSE", "WORLD_BASE"}
+    assert {code for _, _, code in done.refusals()} == {"RUN_TIME_POSE", "UNKNOWN_FRAME"}
     assert done.edited() == set()
 
 
@@ -178,7 +178,9 @@ def test_copies_under_home_are_not_live(tmp_path):
     files["HOME/Weld.mod"] = files["RAPID/TASK1/PROGMOD/Weld.mod"]
     done = run(tmp_path, files)
     assert done.code == 0, done.err
-    assert (done.folder / "HOME/Weld.mod").read_bytes() == files["HOME/Weld.mod"].replace("\n", "\r\n").encode("latin-1")
+    assert (done.folder / "HOME/Weld.mod").read_bytes() == files["HOME/Weld.mod"].replace("\n", "\r\n").encode(
+        "latin-1"
+    )
 
 
 def test_an_encoded_module_is_copied(tmp_path):

@@ -1,7 +1,7 @@
-"""Kinematics of the two sample robots from nothing but the standard library: elementary products and the law of cosines.
+"""Kinematics of two robots from nothing but the standard library: elementary products and the law of cosines.
 
-It shares no code, no convention and no library with respot: the arm is drawn stretched out horizontally (KUKA) or with its
-upper arm upright (ABB), as the makers draw it.
+It shares no code, no convention and no library with respot: the arm is drawn stretched out horizontally (KUKA) or with
+its upper arm upright (ABB), as the makers draw it.
 """
 
 import math
@@ -34,7 +34,7 @@ def wrap(angle):
 
 @dataclass
 class Arm:
-    """Lengths as the makers draw them: ``fore`` and ``up`` lead from axis 3 to the wrist with the forearm horizontal."""
+    """Lengths as the makers draw them: ``fore``, ``up`` lead from axis 3 to the wrist, the forearm being horizontal."""
 
     kuka: bool
     a1: float
@@ -70,8 +70,7 @@ class Arm:
                 lower = -math.atan2(z, x) - math.atan2(forearm * math.sin(bend), self.upper + forearm * math.cos(bend))
                 slope = math.degrees(lower + bend + math.atan2(self.up, self.fore))
                 second = math.degrees(lower) + (0.0 if self.kuka else 90.0)
-                for joints in self._hand(pose, heading, second, slope):
-                    found.append((joints, behind, above))
+                found += [(joints, behind, above) for joints in self._hand(pose, heading, second, slope)]
         return found
 
     def _hand(self, pose, heading, second, slope):

@@ -36,7 +36,7 @@ def test_loads_are_the_slope_of_the_energy(robot):
 
 
 def test_stretched_arm_by_hand():
-    # stretched out, a weight of 1 N in the origin of frame 3 hangs 1150 mm in front of axis 2 and pulls it down: A2 grows
+    # stretched out, 1 N in the origin of frame 3 hangs 1150 mm in front of axis 2 and pulls it down: A2 grows
     basis = gravity_basis(PRIME, np.zeros(6), [0, 0, -1])[0]
     assert basis[1, 2, 0] == pytest.approx(1150)
     assert basis[0] == pytest.approx(0.0)  # axis 1 is vertical

@@ -65,7 +65,7 @@ def test_parameters_have_names():
 
 
 def test_by_hand_for_axis_one():
-    # KR 210 R2700 prime at home: one degree of A1 moves the flange 1790 mm * pi / 180 to the right and turns it by -1 about Z
+    # KR 210 R2700 prime at home: a degree of A1 moves the flange 1790 mm * pi / 180 to the right, turns it -1 about Z
     robot = built_in_robots()["kr210_r2700_prime"].model
     column = robot.jacobian([0, -90, 90, 0, 0, 0])[0, :, 0]
     assert column == pytest.approx([0, -1790 * np.pi / 180, 0, 0, 0, -1], abs=1e-12)

@@ -27,8 +27,8 @@ def nearest(solutions, joints):
     return np.nanmin(np.abs(solutions - joints).max(axis=1))
 
 
-# Flange of a KR 210 R2700 prime, from its drawing: 350 + 1200 + 240 forward, 675 + 1150 - 41 up. Each row turns one axis of
-# the first; the columns are A1..A6, X, Y, Z and where the flange's z and x axes point.
+# Flange of a KR 210 R2700 prime, from its drawing: 350 + 1200 + 240 forward, 675 + 1150 - 41 up. Each row turns one
+# axis of the first; the columns are A1..A6, X, Y, Z and where the flange's z and x axes point.
 KUKA_TABLE = [
     ((0, -90, 90, 0, 0, 0), (1790, 0, 1784), (1, 0, 0), (0, 0, -1)),
     ((90, -90, 90, 0, 0, 0), (0, -1790, 1784), (0, -1, 0), (0, 0, -1)),  # A1 clockwise from above
@@ -74,7 +74,7 @@ def test_abb_zero_as_the_pendant_shows_it():
 
 
 def test_parallel_linkage_holds_the_forearm_level():
-    # IRB 2400: axis 3 is the forearm's own angle; with axis 2 at 30 degrees and axis 3 at 0 the forearm stays horizontal.
+    # IRB 2400: axis 3 is the forearm's own angle; with axis 2 at 30 degrees and axis 3 at 0 the forearm stays level
     robot = find_robot("irb2400")
     flange = robot.forward([0, 30, 0, 0, 0, 0])
     forward, up = 100 + 705 * 0.5 + 755 + 85, 615 + 705 * math.sqrt(0.75) + 135
@@ -213,8 +213,8 @@ def test_bad_joints_are_refused(joints, match):
 
 @pytest.mark.parametrize(
     ("change", "match"),
-    [({"c2": 0.0}, "c2"), ({"c3": -5.0}, "c3"), ({"a1": np.nan}, "a1"), ({"c4": 2e5}, "c4"), ({"signs": (1, 1, 1, 1, 1, 0)}, "signs"),
-     ({"offsets_deg": (0.0,)}, "offsets_deg")],
+    [({"c2": 0.0}, "c2"), ({"c3": -5.0}, "c3"), ({"a1": np.nan}, "a1"), ({"c4": 2e5}, "c4"),
+     ({"signs": (1, 1, 1, 1, 1, 0)}, "signs"), ({"offsets_deg": (0.0,)}, "offsets_deg")],
 )  # fmt: skip
 def test_absurd_lengths_are_refused(change, match):
     row = {"name": "x", "a1": 350, "a2": 41, "c1": 675, "c2": 1150, "c3": 1200, "c4": 240} | change

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from respot.cli import options
-from respot.cli.outcome import DONE, Outcome
+from respot.cli.outcome import Outcome
 from respot.cli.outcome import run as run_command
 
 HELP = "Convert the rear-door samples, a KUKA and an ABB backup, and show the result and the commands."

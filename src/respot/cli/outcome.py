@@ -1,7 +1,7 @@
 """One object owns what a command says and the code it exits with.
 
-Exit codes: 0 done; 1 the answer is no, or ``--strict`` and an issue of level error; 2 bad usage or input, nothing written;
-3 internal error; 130 interrupted. Data go to stdout, words to stderr.
+Exit codes: 0 done; 1 the answer is no, or ``--strict`` and an issue of level error; 2 bad usage or input, nothing
+written; 3 internal error; 130 interrupted. Data go to stdout, words to stderr.
 """
 
 from __future__ import annotations

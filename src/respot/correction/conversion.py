@@ -138,7 +138,9 @@ def convert(
         raise BadInputError("BAD_OPTION", message)
     moves = _moves_of(read, ids)
     if not moves:
-        raise BadInputError("NO_COMMON_IDS", "holds none of the spots that the calibration was fitted to", str(source))
+        detail = f": {read.spots.issues[0]}" if read.spots.issues else ""
+        message = f"holds none of the spots that the calibration was fitted to{detail}"
+        raise BadInputError("NO_COMMON_IDS", message, str(source))
     correction = align(read.robot, model.source2reference, model.content_hash, moves, options)
     refused = [
         Issue(refusal.code, f"{refusal.target}: {refusal.message}", refusal.path, refusal.line)

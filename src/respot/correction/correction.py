@@ -1,9 +1,10 @@
-"""A calibration, a robot and its matched spots become edits, file by file; what cannot be corrected refuses its program."""
+"""A calibration, a robot and its matched spots become edits; what cannot be corrected refuses its program."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.spatial import Delaunay, QhullError
@@ -248,7 +249,7 @@ def _edits(
         if not kept((move.program,), str(move.target)) and move.offset is not None and move.base is not None:
             assert move.base.pose is not None  # noqa: S101
             values = new_offset(move.offset, move.base.pose, source2reference)
-            edits.append(offset_edit(move, values, robot.files[move.offset.path].source.text, language, made))
+            edits.append(offset_edit(move, values, robot.files[move.offset.path].source.text, made))
     return [edit for edit in edits if edit is not None]
 
 
@@ -276,7 +277,7 @@ def _transitions(scope: Scope, moved: set[int], refused_programs: frozenset[str]
         if routine.program in refused_programs:
             continue
         moves = [move for move in routine.moves if move.target is not None]
-        for first, second in zip(moves, moves[1:], strict=False):
+        for first, second in pairwise(moves):
             if (id(first.target) in moved) != (id(second.target) in moved):
                 found.append(
                     Transition(str(first.target), str(second.target), routine.program, second.path, second.line)
@@ -295,8 +296,9 @@ def _issues(
     issues += [Issue("NOT_CHECKED", note) for note in notes_of(robot)]
     left = [stay.target.name for stay in scope.stays if stay.code == "SAME_BASE_STAYS"]
     if left:
-        message = f"{', '.join(left[:10])}{' ...' if len(left) > 10 else ''}: no routine that belongs to a matched spot goes there"
-        issues.append(Issue("SAME_BASE_STAYS", f"{message}; --programs takes their programs in"))
+        names = ", ".join(left[:10]) + (" ..." if len(left) > 10 else "")
+        message = "no routine that belongs to a matched spot goes there; --programs takes their programs in"
+        issues.append(Issue("SAME_BASE_STAYS", f"{names}: {message}"))
     issues += _extrapolated(moving, spot_moves)
     for path in dict.fromkeys(edit.path for edit in edits):
         if LANGUAGES[robot.language].header_place(robot.files[path]) is None:
@@ -318,8 +320,8 @@ def _extrapolated(moving: Sequence[Moving], spot_moves: Sequence[Move]) -> list[
     names = [item.target.name for item, out in zip(moving, outside, strict=True) if out]
     farthest = names[int(nearest.argmax())]
     message = (
-        f"{int(outside.sum())} of {len(points)} moved targets lie outside the hull of the {len(spots)} fitted spots; the "
-        f"farthest is {farthest}, {float(nearest.max()):.0f} mm from the nearest spot"
+        f"{int(outside.sum())} of {len(points)} moved targets lie outside the hull of the {len(spots)} fitted spots; "
+        f"the farthest is {farthest}, {float(nearest.max()):.0f} mm from the nearest spot"
     )
     return [Issue("EXTRAPOLATED", message)]
 

@@ -1,7 +1,7 @@
 """Depth `points`: every moved target gets the numbers of its new pose, in its own base.
 
-With G = source2reference and B = base2world, the TCP must come to G B T; the target becomes T' = B^-1 G B T. An offset d
-along the base becomes R(B)^-1 R(G) R(B) d, so that B (T' + d') = G B (T + d).
+With G = source2reference and B = base2world, the TCP must come to G B T; the target becomes T' = B^-1 G B T. An offset
+d along the base becomes R(B)^-1 R(G) R(B) d, so that B (T' + d') = G B (T + d).
 """
 
 from __future__ import annotations
@@ -124,7 +124,7 @@ def new_offset(offset: BaseOffset, base: RigidTransform, source2reference: Rigid
     return np.asarray(in_base(base, source2reference).rotation.apply(old))
 
 
-def offset_edit(move: Move, values: Array, text: str, language: Language, templates: Templates) -> PointEdit | None:
+def offset_edit(move: Move, values: Array, text: str, templates: Templates) -> PointEdit | None:
     """Edit of an offset along the base; None where nothing changes to the last digit."""
     offset = move.offset
     assert offset is not None  # noqa: S101

@@ -169,7 +169,7 @@ def _refusal(move: Move, bases: set[int], language: Language, calls_only: bool) 
     if move.target is None and move.offset is None:
         return refuse("RUN_TIME_POSE", move.unknown) if move.unknown else None
     if move.base is None:
-        return refuse("UNKNOWN_FRAME", "the program does not tell the base of this motion")
+        return refuse("UNKNOWN_FRAME", move.unknown or "the program does not tell the base of this motion")
     if move.base.pose is None:
         return refuse("UNKNOWN_FRAME", f"base {move.base}: {move.base.unknown}")
     elsewhere = calls_only or language.forms.is_service(move.routine)

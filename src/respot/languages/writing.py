@@ -1,7 +1,7 @@
 """Changed text comes from templates: literals with the gaps and number style of their source, and the header.
 
-Robot-code templates use ``<< >>``, ``<% %>`` and ``<# #>``, since KRL has braces of its own; they render with line feeds
-and get the file's line end afterwards. Text of a program reaches a template as data only.
+Robot-code templates use ``<< >>``, ``<% %>`` and ``<# #>``, since KRL has braces of its own; they render with line
+feeds and get the file's line end afterwards. Text of a program reaches a template as data only.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ class Templates:
         if overlay is not None:
             folders.insert(0, overlay / language)
         # robot code is no HTML: escaping would change it
-        self._environment = Environment(  # noqa: S701
+        self._environment = Environment(
             loader=FileSystemLoader(folders),
             block_start_string="<%",
             block_end_string="%>",
@@ -97,7 +97,7 @@ class Templates:
             comment_start_string="<#",
             comment_end_string="#>",
             undefined=StrictUndefined,
-            autoescape=False,
+            autoescape=False,  # noqa: S701
             keep_trailing_newline=False,
         )
         self._environment.filters["spell"] = spell

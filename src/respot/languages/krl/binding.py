@@ -235,7 +235,7 @@ class _Walk:
         name = node.tokens("NAME")[0].text
         arguments = [argument.text.strip() for argument in (node.first("arguments") or node).nodes]
         if name.upper() == "BAS":
-            self._bas(node, [argument.upper() for argument in arguments])
+            self._bas([argument.upper() for argument in arguments])
             return
         if FORMS.welds(name, arguments):
             self._weld()
@@ -244,7 +244,7 @@ class _Walk:
         if name.upper() in self._binder._framing:
             self._state = _State()
 
-    def _bas(self, node: Node, arguments: list[str]) -> None:
+    def _bas(self, arguments: list[str]) -> None:
         command = arguments[0] if arguments else ""
         number = int(arguments[1]) if len(arguments) > 1 and arguments[1].isdigit() else None
         frames = self._binder._frames

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from decimal import Decimal, InvalidOperation
 from typing import TypeAlias
 
+from respot.languages.literals import number_of
 from respot.program.statement import Node, Statement
 from respot.program.targets import Number
 from respot.source import Span
@@ -91,21 +91,6 @@ def value_of(node: Node) -> Value:
         members = {member.tokens("NAME")[0].text.upper(): value_of(member.nodes[-1]) for member in node.all("member")}
         return Aggregate(members, names[0].text.upper() if names else "", node.span)
     return node.text
-
-
-def number_of(node: Node) -> Number | None:
-    """Number of a literal with its sign, None for any other expression."""
-    inner, negative = node, False
-    while inner.kind == "signed":
-        negative ^= inner.tokens("SIGN")[0].text == "-"
-        inner = inner.nodes[-1]
-    if inner.kind != "number":
-        return None
-    try:
-        value = Decimal(inner.text)
-    except InvalidOperation:
-        return None
-    return Number(value.copy_negate() if negative else value, node.span)
 
 
 def read_symbols(path: str, statements: Iterable[Statement], module: str, everywhere: bool = False) -> Scope:

@@ -2,31 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-
 from respot.languages.krl.machine import frame_pose
 from respot.languages.krl.symbols import Aggregate, Symbol
+from respot.languages.literals import TargetTable
 from respot.program.targets import Target, TargetKind
-from respot.source import SourceText
 
 POSITION_TYPES = frozenset(("POS", "E6POS", "E3POS", "FRAME", "AXIS", "E6AXIS", "E3AXIS"))
 
 
-class Targets:
-    """Every literal position of a robot, one `Target` for each place in a file.
-
-    Parameters
-    ----------
-    sources : mapping of str to SourceText
-        The files, by path.
-    """
-
-    def __init__(self, sources: Mapping[str, SourceText]) -> None:
-        self._sources = sources
-        self._targets: dict[tuple[str, int], Target] = {}
-
-    def __iter__(self) -> Iterator[Target]:
-        return iter(self._targets.values())
+class Targets(TargetTable):
+    """Every literal position of a robot."""
 
     def declared(self, symbol: Symbol) -> Target | None:
         """Target of a declared point or array element; None if it is no literal position."""
@@ -44,7 +29,7 @@ class Targets:
             if kind is None:
                 return None
             found = frame_pose(aggregate) if kind is TargetKind.POSE else None
-            line, column = self._sources[path].place(aggregate.span[0])
+            line, column = self.place(path, aggregate.span[0])
             self._targets[key] = Target(
                 name=name,
                 kind=kind,

@@ -10,10 +10,11 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+from respot.languages.literals import number_of
 from respot.languages.rapid import machine
 from respot.languages.rapid.blocks import Routine as Block
 from respot.languages.rapid.forms import FORMS
-from respot.languages.rapid.symbols import Aggregate, Module, Symbol, Task, number_of, routine_symbols, value_of
+from respot.languages.rapid.symbols import Aggregate, Module, Symbol, Task, routine_symbols, value_of
 from respot.languages.rapid.targets import Targets
 from respot.program.frames import Frame
 from respot.program.moves import BaseOffset, Motion, Move
@@ -22,8 +23,10 @@ from respot.program.statement import Node, Statement
 from respot.program.targets import Target, TargetKind
 
 #: Instructions of RobotWare that move to their first positions (facts: rapid.md 1.5).
-_INSTRUCTION = re.compile(r"(?:Move(?:L|J|C|AbsJ)(?:DO|GO|AO|Sync)?|SpotM?[LJ]|Trigg[LJC]|Search[LC]|Calib[LJ]|Arc[LC](?:Start|End)?)",
-                          re.IGNORECASE)  # fmt: skip
+_INSTRUCTION = re.compile(
+    r"Move(?:L|J|C|AbsJ)(?:DO|GO|AO|Sync)?|SpotM?[LJ]|Trigg[LJC]|Search[LC]|Calib[LJ]|Arc[LC](?:Start|End)?",
+    re.IGNORECASE,
+)
 _JOINT = re.compile(r"(?:Move(?:Abs)?|SpotM?|Trigg|Calib)J", re.IGNORECASE)
 _CIRCULAR = re.compile(r"(?:Move|Trigg|Search|Arc)C", re.IGNORECASE)
 
@@ -67,10 +70,13 @@ class Binder:
         for statement in block.body:
             for call in _calls(statement):
                 name, found = self._bind(call, statement, block, module, local)
-                if found:
-                    moves += found
+                moves += found
+                if found and found[0].base is None and self._task.has_routine(name, module):
+                    calls.append(name)
+                elif found:
+                    continue
                 elif FORMS.welds(name, []) and moves:
-                    moves[-1] = self._welding(moves[-1], [])
+                    moves[-1] = replace(moves[-1], weld=True)
                 elif name:
                     calls.append(name)
         return Routine(block.name, module.name, module.path, block.head.line, tuple(moves), tuple(calls))
@@ -99,6 +105,7 @@ class Binder:
         operands = [operand for node in positional if (operand := self._operand(node, name, module, local, statement))]
         tool = next((symbol for symbol in symbols if symbol is not None and symbol.type == "tooldata"), None)
         flange = any(node.text.lower() == "tool0" for node in positional)
+        handed = False
         instruction = _INSTRUCTION.fullmatch(name) is not None and not self._task.has_routine(name, module)
         if not operands and not instruction:
             return name, []
@@ -107,6 +114,7 @@ class Binder:
         elif tool is None and not flange and not instruction:
             reason = f"the position is handed to {name}, which respot does not know as a motion"
             operands = [replace(operand, unknown=operand.unknown or reason) for operand in operands]
+            handed = True
         spot_data = [symbol.name for symbol in symbols if symbol is not None and symbol.type == "spotdata"]
         motion = _motion(name)
         first = Move(
@@ -118,7 +126,7 @@ class Binder:
             path=module.path,
             line=statement.line,
             tool=machine.TOOL0 if flange else None if tool is None else self.frame(tool),
-            base=self._work_object(arguments, module, local),
+            base=None if handed else self._work_object(arguments, module, local),
             weld=bool(spot_data) or bool(FORMS.weld_instructions and FORMS.weld_instructions.match(name)),
         )
         moves = [self._move(first, operand, spot_data) for operand in operands]
@@ -132,9 +140,6 @@ class Binder:
         move = replace(move, target=operand.target, offset=operand.offset, unknown=unknown, external_tcp=external)
         name = operand.target.name if operand.target is not None and operand.target.declared else ""
         return replace(move, spot_ids=FORMS.spot_ids(name, spot_data))
-
-    def _welding(self, move: Move, spot_data: list[str]) -> Move:
-        return replace(move, weld=True)
 
     def _symbol(self, node: Node, module: Module, local: dict[str, Symbol]) -> Symbol | None:
         if node.kind != "reference":

@@ -19,6 +19,8 @@ _LITERALS["FALSE"] = _LITERALS["TRUE"]
 _SIGNS = ("+", "-")
 #: Tokens of an aggregate whose rows are built each time they are asked for: they would fill the memory.
 _LARGE = 200
+#: Tokens of a statement whose shape is worth keeping: none of a longer table is met again.
+_LARGEST_KEPT = 20_000
 #: Deeper ones are left to the grammar, which refuses them.
 _DEEPEST = 50
 
@@ -58,7 +60,7 @@ class RapidShapes(Shapes):
         start: str,
         token: re.Pattern[str],
         split: Splitter,
-        end: Callable[[list[str], int], int | None],
+        end: Callable[[Sequence[str], int], int | None],
     ) -> None:
         super().__init__(grammar, start, token, split)
         self._end = end
@@ -76,20 +78,27 @@ class RapidShapes(Shapes):
 
     def read_table(self, text: str) -> Unit:
         """Read one long statement as `read` does, without a list of all its words."""
-        kinds = [kind for match in self._words.finditer(text) if (kind := self._kinds[match.group()])]
+        kinds = tuple(kind for match in self._words.finditer(text) if (kind := self._kinds[match.group()]))
         if self._end(kinds, 0) != len(kinds) - 1:
             return None
-        return (Part(0, len(kinds) - 1, self._shape(text, kinds, 0, len(kinds) - 1)),)
+        shape = self._shape_of(text, kinds, 0)
+        return None if shape is None else (Part(0, len(kinds) - 1, shape),)
 
     def _shape(self, text: str, kinds: list[str], first: int, last: int) -> Shape:
-        key = tuple(kinds) if last - first == len(kinds) - 1 else tuple(kinds[first : last + 1])
-        shape = self._parts.get(key)
+        shape = self._shape_of(text, tuple(kinds[first : last + 1]), first)
+        return super()._shape(text, kinds, first, last) if shape is None else shape
+
+    def _shape_of(self, text: str, kinds: tuple[str, ...], first: int) -> Shape | None:
+        """Shape of a statement that begins at a token of a text; None if it has to be parsed as it is."""
+        shape = self._parts.get(kinds)
         if shape is None:
-            taken = literal_aggregates(key)
-            kept = _kept(len(key), taken)
-            if len(kept) == len(key):
-                return super()._shape(text, kinds, first, last)
-            shape = self._parts[key] = self._laid(self._without(text, first, kept), key, kept, dict(taken))
+            taken = literal_aggregates(kinds)
+            kept = _kept(len(kinds), taken)
+            if len(kept) == len(kinds):
+                return None
+            shape = self._laid(self._without(text, first, kept), kinds, kept, dict(taken))
+            if len(kinds) <= _LARGEST_KEPT:
+                self._parts[kinds] = shape
         return shape
 
     def _without(self, text: str, first: int, kept: list[int]) -> Shape:

@@ -25,7 +25,7 @@ Configuration = dict[str, list[dict[str, str]]]
 
 
 def read_configuration(text: str) -> Configuration:
-    """Instances of a ``.cfg`` file by type: ``{"ROBOT": [{"name": .., "use_robot_type": ..}]}`` (facts: rapid.md 4.3)."""
+    """Instances of a ``.cfg`` file by type: ``{"ROBOT": [{"use_robot_type": ..}]}`` (facts: rapid.md 4.3)."""
     found: Configuration = {}
     section = ""
     joined = re.sub(r"\\[ \t]*\r*\n", " ", text)

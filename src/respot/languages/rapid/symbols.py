@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from decimal import Decimal, InvalidOperation
 from typing import TypeAlias
 
+from respot.languages.literals import number_of
 from respot.languages.rapid.blocks import Layout
 from respot.languages.rapid.blocks import Routine as Block
 from respot.program.statement import Node, Statement
@@ -85,21 +85,6 @@ def value_of(node: Node) -> Value:
     if node.kind == "aggregate":
         return Aggregate([value_of(item) for item in node.nodes], node.span)
     return node.text
-
-
-def number_of(node: Node) -> Number | None:
-    """Number of a decimal literal with its sign, None for any other expression."""
-    inner, negative = node, False
-    while inner.kind == "signed":
-        negative ^= inner.tokens("SIGN")[0].text == "-"
-        inner = inner.nodes[-1]
-    if inner.kind != "number":
-        return None
-    try:
-        value = Decimal(inner.text)
-    except InvalidOperation:
-        return None
-    return Number(value.copy_negate() if negative else value, node.span)
 
 
 def data_symbol(path: str, statement: Statement) -> Symbol | None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
+from collections.abc import Sequence
 
 from respot.languages.rapid.literals import RapidShapes
 from respot.languages.shapes import LONGEST_STATEMENT, Cache, Part, Unit
@@ -42,6 +43,11 @@ NO_STATEMENT = frozenset((COMMENT, AFTER_MODULE))
 
 def _words(words: str) -> frozenset[str]:
     return frozenset(words.split())
+
+
+def _any_of(words: frozenset[str]) -> str:
+    """Pattern of any of these words; placeholders are none."""
+    return "|".join(sorted(word for word in words if word.isalpha()))
 
 
 #: Words that are whole statements.
@@ -85,7 +91,7 @@ def _split(kinds: list[str]) -> list[Span] | None:
     return ranges
 
 
-def _end(kinds: list[str], first: int) -> int | None:
+def _end(kinds: Sequence[str], first: int) -> int | None:
     """Index of the last token of a statement; it ends before a word that can only begin the next one."""
     at = first
     while at < len(kinds) - 1 and kinds[at] in _MODIFIERS:
@@ -117,13 +123,13 @@ def _end(kinds: list[str], first: int) -> int | None:
     return None
 
 
-def _name_after(kinds: list[str], at: int) -> int | None:
+def _name_after(kinds: Sequence[str], at: int) -> int | None:
     if at + 1 == len(kinds):
         return None
     return at if kinds[at + 1] in _FIRST_IN_SIMPLE else at + 1
 
 
-def _routine_head(kinds: list[str], at: int, opening: int) -> int | None:
+def _routine_head(kinds: Sequence[str], at: int, opening: int) -> int | None:
     for index in range(at + 1, min(at + opening, len(kinds))):
         if kinds[index] in _FIRST_IN_SIMPLE or kinds[index] == ";":
             return index - 1
@@ -134,7 +140,7 @@ def _routine_head(kinds: list[str], at: int, opening: int) -> int | None:
     return _closing(kinds, at + opening)
 
 
-def _closing(kinds: list[str], opening: int) -> int | None:
+def _closing(kinds: Sequence[str], opening: int) -> int | None:
     """Index of the bracket that closes another; before it is found a head ends at ``;`` or at the next statement."""
     depth = 0
     for index in range(opening, len(kinds)):
@@ -164,17 +170,12 @@ _HEADER = re.compile(r"%%%[^%]*%%%")
 _MODULE = re.compile(r"%%%|MODULE\s+[^\W\d]\w*\s*(?:[(!]|\Z)", re.IGNORECASE)
 _WORD = re.compile(r"[^\W\d]\w*|<(?:TDN|DDN|RDN|PAR|ALT|DIM|SMT|VAR|EIT|CSE|EXP|ARG|ID)>|%", re.IGNORECASE)
 #: What can hold the end of a statement; cheaper than the tokens of the line.
-_MAY_END = re.compile(
-    r"[;:)]|\b(?:THEN|DO|END\w+|"
-    + "|".join(word for word in sorted(_FIRST_IN_SIMPLE) if word[0] != "<")
-    + r")\b|<\w+>",
-    re.IGNORECASE,
-)
+_MAY_END = re.compile(rf"[;:)]|\b(?:THEN|DO|END\w+|{_any_of(_FIRST_IN_SIMPLE)})\b|<\w+>", re.IGNORECASE)
 #: Ends of a statement in a text too long for tokens: strings and comments are skipped.
 _SEMICOLON = re.compile(r'"[^"\r\n]*"|![^\r\n]*|;')
 #: A line that begins a statement whatever stands before it: no expression holds two operands in a row.
 _TWO_OPERANDS = re.compile(
-    r"""[^\W\d]\w*(?:\s+(?!(?:AND|OR|XOR|DIV|MOD|THEN|DO|FROM|TO|STEP|WITH)\b)[^\W\d]|\s+[0-9.]|\s*["\[])""",
+    rf"""[^\W\d]\w*(?:\s+(?!(?:{_any_of(_FIRST_IN_SIMPLE | _WITHIN)})\b)[^\W\d]|\s+[0-9.]|\s*["\[])""",
     re.IGNORECASE,
 )
 _ASSIGNS = re.compile(r"[^\W\d]\w*(?:\s*\{[^}]*\}|\s*\.\s*[^\W\d]\w*)*\s*:=", re.IGNORECASE)
@@ -304,11 +305,7 @@ class _Reader:
         if parts is not None:
             self._add(parts, start, stop)
             return
-        whole = self._whole(line)
-        if whole:
-            self._add(SHAPES.last(line[:whole]), start, start + len(line[:whole].rstrip(_BLANK)))
-            start, line = start + whole, line[whole:]
-        self._begun = _Begun(start, stop, number, _first_words(line))
+        self._begin(start, stop)
         if len(line) > LONGEST_STATEMENT and _has_semicolon(line):
             self._add_long(self._begun)
 
@@ -325,15 +322,19 @@ class _Reader:
         del self._statements[index:]
         return head
 
-    def _whole(self, line: str) -> int:
-        """Length of the whole statements of a line whose last one goes on."""
-        if len(line) > LONGEST_STATEMENT:
-            return 0
-        kinds, spans = SHAPES.kinds(line)
-        first = 0
-        while (last := _end(kinds, first)) is not None and last + 1 < len(kinds):
-            first = last + 1
-        return spans[first][0] if first else 0
+    def _begin(self, start: int, stop: int) -> None:
+        """Begin the last statement of a run of lines, which goes on; those before it are whole."""
+        text = self._text[start:stop]
+        if len(text) <= LONGEST_STATEMENT:
+            kinds, spans = SHAPES.kinds(text)
+            first = 0
+            while (last := _end(kinds, first)) is not None and last + 1 < len(kinds):
+                first = last + 1
+            if first:
+                self._add(SHAPES.last(text[: spans[first][0]]), start, start + spans[first - 1][1])
+                start += spans[first][0]
+                text = self._text[start:stop]
+        self._begun = _Begun(start, stop, bisect_right(self._line_starts, start), _first_words(text))
 
     def _header(self, start: int, stop: int, number: int) -> None:
         """Take the lines of a file header, or its first line where it is not closed."""
@@ -366,6 +367,11 @@ class _Reader:
             if begun.tries > _MOST_TRIES:
                 self._cut()
                 return
+            self._begin(begun.start, stop)
+            if self._begun is not None and self._begun.start == begun.start:
+                self._begun = begun
+            else:
+                return
         if len(begun.words) < _FIRST_WORDS:
             begun.words = (*begun.words, *_first_words(line))[:_FIRST_WORDS]
 
@@ -376,7 +382,7 @@ class _Reader:
             return False
         word = found.group().upper()
         compact = begun.words[0] == "IF" and begun.joined is None
-        if word in _WITHIN:
+        if word in _WITHIN or (word == "%" and "%" in self._text[begun.start : begun.stop]):
             return False
         if begun.words[0] in _HEADS and word not in _FIRST:
             return self._leaves_head(begun)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 
 from respot.geometry import pose, rotation_from_quaternion
+from respot.languages.literals import TargetTable
 from respot.languages.rapid.symbols import Aggregate, Symbol, Value
 from respot.program.targets import Number, Target, TargetKind
-from respot.source import SourceText
 from respot.tolerance import QUATERNION_NORM
 
 ROBTARGET_FIELDS = (
@@ -28,21 +28,8 @@ _KINDS = {
 }
 
 
-class Targets:
-    """Every literal position of a robot, one `Target` for each place in a file.
-
-    Parameters
-    ----------
-    sources : mapping of str to SourceText
-        The files, by path.
-    """
-
-    def __init__(self, sources: Mapping[str, SourceText]) -> None:
-        self._sources = sources
-        self._targets: dict[tuple[str, int], Target] = {}
-
-    def __iter__(self) -> Iterator[Target]:
-        return iter(self._targets.values())
+class Targets(TargetTable):
+    """Every literal position of a robot."""
 
     def declared(self, symbol: Symbol) -> dict[tuple[int, ...], Target]:
         """Targets within a datum, by their index in it; ``()`` is the datum itself."""
@@ -69,7 +56,7 @@ class Targets:
         if key not in self._targets:
             kind, groups = found
             numbers = _numbers(aggregate, groups)
-            line, column = self._sources[path].place(aggregate.span[0])
+            line, column = self.place(path, aggregate.span[0])
             values = [numbers.get(field) for group in ROBTARGET_FIELDS[:2] for field in group]
             unknown = _doubt(values) if kind is TargetKind.POSE else ""
             known = kind is TargetKind.POSE and not unknown
