@@ -20,6 +20,7 @@ ROOMS = (
     "backups",
     "tables",
     "kinematics",
+    "checking",
     "spots",
     "inspection",
     "registration",

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import zipfile
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -89,20 +90,22 @@ def open_backup(path: Path) -> Backup:
         ``CANNOT_READ`` if the path is missing or unreadable, ``UNSAFE_ARCHIVE`` if an entry would leave its folder, is
         a link, differs from another in case only, or if the whole is too large.
     """
-    try:
-        if path.is_dir():
-            files = _read_folder(path)
-        elif path.is_file() and zipfile.is_zipfile(path):
-            files = _read_zip(path)
-        elif path.is_file():
-            files = _read_file(path)
-        else:
-            raise BadInputError("CANNOT_READ", "no such file or folder", str(path))
-    except (OSError, zipfile.BadZipFile, RuntimeError, NotImplementedError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise BadInputError("CANNOT_READ", reason, str(path)) from error
+    files = read_files(path)
     robots = [language.read_robot(name, root, own) for language, root, name, own in _robots(path, files)]
     return Backup(path, files, robots, [])
+
+
+def read_files(path: Path) -> dict[str, bytes]:
+    """Return every file of a folder or zip, or a program file with its data list, by path with ``/``; errors as above."""
+    try:
+        if path.is_dir():
+            return _read_folder(path)
+        if path.is_file():
+            return _read_zip(path) if zipfile.is_zipfile(path) else _read_file(path)
+    except (OSError, zipfile.BadZipFile, RuntimeError, NotImplementedError, zlib.error) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise BadInputError("CANNOT_READ", reason, str(path)) from error
+    raise BadInputError("CANNOT_READ", "no such file or folder", str(path))
 
 
 def _read_folder(path: Path) -> dict[str, bytes]:

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 
 from scipy.spatial.transform import RigidTransform
 
+from respot.issues import Issue
 from respot.languages.forms import Forms
 from respot.program.robot import ProgramFile, Robot
+from respot.program.statement import Statement
 from respot.program.targets import Target
 from respot.source import Span
 
@@ -25,6 +27,16 @@ class Language:
         Name for people.
     suffixes : sequence of str
         Suffixes of its program files.
+    encodings : sequence of str
+        Its code pages.
+    no_statement : frozenset of str
+        Kinds that count as no statement.
+    recognise : callable
+        What a file with such a suffix holds: the language's name, ``binary`` or ``other``.
+    read_statements : callable
+        ``read_statements(text, line_starts)``.
+    block_issues : callable
+        ``block_issues(path, statements)``: what is opened and not closed.
     forms : Forms
         Its instruction forms.
     read_robot : callable
@@ -44,6 +56,11 @@ class Language:
     name: str
     title: str
     suffixes: Sequence[str]
+    encodings: Sequence[str]
+    no_statement: frozenset[str]
+    recognise: Callable[[bytes], str]
+    read_statements: Callable[[str, list[int]], list[Statement]]
+    block_issues: Callable[[str, Sequence[Statement]], list[Issue]]
     forms: Forms
     read_robot: Callable[[str, str, Mapping[str, bytes]], Robot]
     pose_values: Callable[[Target, RigidTransform], dict[str, float]]

@@ -1,6 +1,6 @@
 """KUKA Robot Language."""
 
-from respot.languages.krl import robot, writer
+from respot.languages.krl import blocks, recognition, robot, syntax, writer
 from respot.languages.krl.forms import FORMS
 from respot.languages.language import Language
 
@@ -8,6 +8,11 @@ KRL = Language(
     name="krl",
     title="KUKA KRL",
     suffixes=robot.SUFFIXES,
+    encodings=syntax.ENCODINGS,
+    no_statement=syntax.NO_STATEMENT,
+    recognise=recognition.recognise,
+    read_statements=syntax.read_statements,
+    block_issues=blocks.block_issues,
     forms=FORMS,
     read_robot=robot.read_robot,
     pose_values=writer.pose_values,

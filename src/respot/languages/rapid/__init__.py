@@ -1,13 +1,18 @@
 """ABB RAPID."""
 
 from respot.languages.language import Language
-from respot.languages.rapid import robot, writer
+from respot.languages.rapid import blocks, recognition, robot, syntax, writer
 from respot.languages.rapid.forms import FORMS
 
 RAPID = Language(
     name="rapid",
     title="ABB RAPID",
     suffixes=robot.SUFFIXES,
+    encodings=syntax.ENCODINGS,
+    no_statement=syntax.NO_STATEMENT,
+    recognise=recognition.recognise,
+    read_statements=syntax.read_statements,
+    block_issues=blocks.block_issues,
     forms=FORMS,
     read_robot=robot.read_robot,
     pose_values=writer.pose_values,

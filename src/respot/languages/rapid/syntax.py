@@ -305,9 +305,9 @@ class _Reader:
         if parts is not None:
             self._add(parts, start, stop)
             return
-        self._begin(start, stop)
+        begun = self._begin(start, stop)
         if len(line) > LONGEST_STATEMENT and _has_semicolon(line):
-            self._add_long(self._begun)
+            self._add_long(begun)
 
     def _head_without_list(self) -> Statement | None:
         """Take back the MODULE or ERROR whose list stands in a line of its own."""
@@ -322,7 +322,7 @@ class _Reader:
         del self._statements[index:]
         return head
 
-    def _begin(self, start: int, stop: int) -> None:
+    def _begin(self, start: int, stop: int) -> _Begun:
         """Begin the last statement of a run of lines, which goes on; those before it are whole."""
         text = self._text[start:stop]
         if len(text) <= LONGEST_STATEMENT:
@@ -335,6 +335,7 @@ class _Reader:
                 start += spans[first][0]
                 text = self._text[start:stop]
         self._begun = _Begun(start, stop, bisect_right(self._line_starts, start), _first_words(text))
+        return self._begun
 
     def _header(self, start: int, stop: int, number: int) -> None:
         """Take the lines of a file header, or its first line where it is not closed."""
@@ -367,11 +368,9 @@ class _Reader:
             if begun.tries > _MOST_TRIES:
                 self._cut()
                 return
-            self._begin(begun.start, stop)
-            if self._begun is not None and self._begun.start == begun.start:
-                self._begun = begun
-            else:
+            if self._begin(begun.start, stop).start != begun.start:
                 return
+            self._begun = begun
         if len(begun.words) < _FIRST_WORDS:
             begun.words = (*begun.words, *_first_words(line))[:_FIRST_WORDS]
 
@@ -393,7 +392,7 @@ class _Reader:
             return True
         kinds = self._last_kinds(begun)
         before = kinds[-1]
-        alone = begun.last in (begun.start, begun.joined) and len(kinds) == 1
+        alone = begun.last in (begun.start, begun.joined) and len(kinds) == 1 and self._begins_line(begun.last)
         if alone and before in _JUMPS:
             return before in _WHOLE_JUMPS or self._indentation(start) <= self._indentation(begun.last)
         if not _is_operand(before):
@@ -420,6 +419,10 @@ class _Reader:
         """Kinds of the tokens of the last line of a statement that goes on."""
         begin = max(begun.last, begun.stop - LONGEST_STATEMENT)
         return SHAPES.kinds(self._text[begin : begun.stop])[0]
+
+    def _begins_line(self, offset: int) -> bool:
+        begin = self._line_starts[bisect_right(self._line_starts, offset) - 1]
+        return not self._text[begin:offset].strip(_BLANK)
 
     def _indentation(self, offset: int) -> int:
         begin = self._line_starts[bisect_right(self._line_starts, offset) - 1]
