@@ -1,12 +1,13 @@
 """Read every robot program of many repositories and print what was understood.
 
-Usage: ``python scripts/corpus.py PATH... [--language krl] [--opaque] [--files]``. A PATH is a git directory (bare or with a
-work tree), a folder of such (each is a repository of its own), a folder of files or a zip archive. Nothing is checked out.
+Usage: ``python scripts/corpus.py PATH... [--language krl|rapid] [--list TABLE] [--opaque]``. A PATH is a git directory
+(bare or with a work tree), a folder of such (each is a repository of its own), a folder of files or a zip archive.
+Nothing is checked out.
 
 Columns: program files; files that only bear a program's suffix and are left alone; files with an opaque statement, and
-those of them in which more than one statement in ten is opaque; bytes; statements; opaque ones and their share; files that
-do not round-trip; literals a plain regular expression finds outside comments, and those that the trees do not hold with
-equal numbers.
+those of them in which more than one statement in ten is opaque; bytes; statements; opaque ones and their share; files
+that do not round-trip; literals a plain regular expression finds outside comments, and those that the trees do not hold
+with equal numbers.
 """
 
 from __future__ import annotations
@@ -91,7 +92,7 @@ LANGUAGES = {
     "krl": Language(
         frozenset((".src", ".dat", ".sub")),
         krl.ENCODINGS,
-        lambda data, source: krl.looks_like_krl(source.text),
+        lambda _data, source: krl.looks_like_krl(source.text),
         krl.read_statements,
         krl.NO_STATEMENT,
         ";",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -38,7 +39,10 @@ def heading(text: str) -> None:
 
 
 def line(text: str = "") -> None:
-    """Print a line."""
+    """Print a line; on a terminal it is wrapped, with its own indent and two more."""
+    if is_terminal():
+        indent = " " * (len(text) - len(text.lstrip()) + 2)
+        text = textwrap.fill(text, terminal_width(), subsequent_indent=indent, break_on_hyphens=False)
     typer.echo(text)
 
 

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from respot.geometry import Array
     from respot.spots import Source
 
-#: The table of spots needs this width to show coordinates.
-_WIDE = 124
+#: Widths of the terminal from which the table of spots shows coordinates, and components of the errors beside them.
+_COORDINATES, _EVERYTHING = 124, 150
 
 
 def show_fit(fitted: SourceFit, tolerance: float, saved: Path | None = None) -> None:
@@ -46,21 +46,24 @@ def describe(source: Source) -> str:
 
 
 def _show_spots(fit: SpotFit) -> None:
-    wide = terminal_width() >= _WIDE
+    width = terminal_width()
+    wide, components = width >= _COORDINATES, width < _COORDINATES or width >= _EVERYTHING
     calibrated, as_found = fit.calibrated, np.linalg.norm(fit.as_found, axis=1)
     after = np.linalg.norm(fit.robust.rigid.residuals, axis=1)
     columns = [Column("spot", number=False)]
     columns += [Column("theoretical x, y, z" if fit.calibration.kind == "theory" else "measured x, y, z")] * wide
     columns += [Column("actual x, y, z")] * wide + [Column("as found")]
     columns += [Column("calibrated x, y, z")] * wide
-    columns += [Column(title) for title in ("after", "dx", "dy", "dz")] + [Column("inlier", number=False)]
+    columns += [Column("after")] + [Column(title) for title in ("dx", "dy", "dz")] * components
+    columns += [Column("inlier", number=False)]
     rows = []
     for row, name in enumerate(fit.ids):
         cells = [f"{name} *" if fit.repaired[row] else name]
-        cells += [_point(fit.reference[row]), _point(fit.source[row])] * 1 if wide else []
+        cells += [_point(fit.reference[row]), _point(fit.source[row])] if wide else []
         cells += [f"{as_found[row]:.2f}"]
         cells += [_point(calibrated[row])] if wide else []
-        cells += [f"{after[row]:.2f}", *(f"{value:+.2f}" for value in fit.robust.rigid.residuals[row])]
+        cells += [f"{after[row]:.2f}"]
+        cells += [f"{value:+.2f}" for value in fit.robust.rigid.residuals[row]] if components else []
         cells += ["yes" if fit.robust.inliers[row] else "no"]
         rows.append(cells)
     table(columns, rows, marked=[bool(value) for value in fit.repaired])
@@ -110,8 +113,7 @@ def _show_transform(fit: SpotFit) -> None:
         line(f"  the spots' centre moves in {name} by {value:8.3f} +- {width:.3f} mm")
     for name, value, width in zip("xyz", turned, half[3:], strict=True):
         line(f"  it turns about {name}         by {value:8.4f} +- {width:.4f} degrees")
-    sure = "" if fit.support.supported else "NOT supported: "
-    line(f"  rotation {sure}{fit.support.verdict}")
+    line(f"  {fit.support.verdict}")
 
 
 def _show_found(fit: SpotFit) -> None:

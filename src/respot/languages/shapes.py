@@ -14,6 +14,7 @@ from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from operator import sub
 from typing import Generic, TypeVar
 
 from lark import Lark, Token, Tree
@@ -146,12 +147,18 @@ class Shapes:
         patterns = [term.pattern.to_regexp() for term in self._parser.lark.terminals if term.name not in _NO_WORDS]
         return re.compile("|".join(patterns))
 
-    def keys(self, text: str) -> list[str]:
+    def keys(self, text: str, line_starts: list[int] | None = None) -> list[str]:
         """Every line of a file, with its end, every run of digits replaced by one.
 
-        Lines with the same key have the same tokens at the same place from either end, apart from the digits.
+        Lines with the same key have the same tokens at the same place from either end, apart from the digits. A line
+        that is too long to be a statement is its own key.
         """
-        return _LINE.findall(self._digits.sub("0", text))
+        if line_starts and max(map(sub, [*line_starts[1:], len(text)], line_starts)) <= LONGEST_STATEMENT:
+            return _LINE.findall(self._digits.sub("0", text))
+        lines = _LINE.findall(text)
+        if max(map(len, lines), default=0) <= LONGEST_STATEMENT:
+            return _LINE.findall(self._digits.sub("0", text))
+        return [line if len(line) > LONGEST_STATEMENT else self._digits.sub("0", line) for line in lines]
 
     def unit(self, text: str, key: str | None = None) -> Unit:
         """Statements of a run of lines without its last line end; None if it ends inside a statement.

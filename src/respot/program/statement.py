@@ -68,12 +68,14 @@ class Numbers(NamedTuple):
 
 
 def number(text: str) -> float:
-    """Value of a number as programs write it: blanks after the sign, or a base as in ``0x1F``."""
-    text = "".join(text.split()).replace("\x1a", "")
+    """Value of a number as programs write it: several signs, blanks after them, a base as in ``0x1F``."""
+    kept = "".join(text.split()).replace("\x1a", "")
+    digits = kept.lstrip("+-")
     try:
-        return float(text)
+        value = float(digits)
     except ValueError:
-        return float(int(text, 0))
+        value = float(int(digits, 0))
+    return -value if kept.count("-", 0, len(kept) - len(digits)) % 2 else value
 
 
 @dataclass(frozen=True)

@@ -38,31 +38,27 @@ def _block(dice: random.Random, column: int, depth: int) -> list[str]:
     gap = " " * column
     lines: list[str] = []
     for _ in range(dice.randrange(2, 5)):
-        kind = dice.randrange(9) if depth else dice.randrange(5)
         n = dice.randrange(9)
-        lines += {
-            0: lambda: [f"{gap}MoveL p{n}0,v100,z10,tGun\\WObj:=wPart;"],
-            1: lambda: [f"{gap}b:=b+f({n})*2;"],
-            2: lambda: [f"{gap}SpotL {TARGET.format(n)},vmax,gun1,sd{n},tGun;"],
-            3: lambda: [f'{gap}TPWrite "station "+ValToStr(b)\\Num:={n};'],
-            4: lambda: [f"{gap}IF b={n} GOTO done{n};", f"{gap}done{n}:"],
-            5: lambda: [
-                f"{gap}IF b={n} AND NOT fast THEN",
-                *_block(dice, column + 2, depth - 1),
-                *([f"{gap}ELSE", *_block(dice, column + 2, depth - 1)] if dice.random() < 0.5 else []),
-                f"{gap}ENDIF",
-            ],
-            6: lambda: [f"{gap}FOR i FROM 1 TO {n} DO", *_block(dice, column + 2, depth - 1), f"{gap}ENDFOR"],
-            7: lambda: [f"{gap}WHILE b<{n} DO", *_block(dice, column + 2, depth - 1), f"{gap}ENDWHILE"],
-            8: lambda: [
-                f"{gap}TEST b",
-                f"{gap}CASE 1,2:",
-                *_block(dice, column + 2, depth - 1),
-                f"{gap}DEFAULT:",
-                *_block(dice, column + 2, depth - 1),
-                f"{gap}ENDTEST",
-            ],
-        }[kind]()
+        simple = [
+            f"MoveL p{n}0,v100,z10,tGun\\WObj:=wPart;",
+            f"b:=b+f({n})*2;",
+            f"SpotL {TARGET.format(n)},vmax,gun1,sd{n},tGun;",
+            f'TPWrite "station "+ValToStr(b)\\Num:={n};',
+            f"IF b={n} GOTO done{n};\n{gap}done{n}:",
+        ]
+        if depth == 0 or dice.random() < 0.5:
+            lines.append(gap + dice.choice(simple))
+            continue
+        first, second = (_block(dice, column + 2, depth - 1) for _ in range(2))
+        blocks = [
+            [f"IF b={n} AND NOT fast THEN", *first, f"{gap}ENDIF"],
+            [f"IF b={n} AND NOT fast THEN", *first, f"{gap}ELSE", *second, f"{gap}ENDIF"],
+            [f"FOR i FROM 1 TO {n} DO", *first, f"{gap}ENDFOR"],
+            [f"WHILE b<{n} DO", *first, f"{gap}ENDWHILE"],
+            ["TEST b", f"{gap}CASE 1,2:", *first, f"{gap}DEFAULT:", *second, f"{gap}ENDTEST"],
+        ]
+        chosen = dice.choice(blocks)
+        lines += [gap + chosen[0], *chosen[1:]]
     return lines
 
 
@@ -138,8 +134,8 @@ def _damage(text: str, kind: str, dice: random.Random) -> Damage | None:
         lines.add(partner - (kind == "lost head" and partner > line))
     if kind == "lost head":
         # what followed the head now stands where nothing of the kind can
-        lines.add(line + 1)
-        lines.update(found.line - 1 for found in statements if found.kind in ("else_", "case", "default"))
+        dividers = [found.line for found in statements if found.kind in ("else_", "case", "default")]
+        lines.update(found - 1 for found in dividers if line < found < (partner or 0))
     return text[:start] + replacement + text[end:], lines
 
 

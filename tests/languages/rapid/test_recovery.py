@@ -99,7 +99,6 @@ HEADS = [
     ("MODULE m\nPROC p(num a,)\na:=1;\nENDPROC\nENDMODULE", [1, 3, 4, 5]),
     ("MODULE m\nFUNC f()\nRETURN 1;\nENDFUNC\nENDMODULE", [1, 3, 4, 5]),
     ("MODULE m\nTRAP\nENDTRAP\nENDMODULE", [1, 3, 4]),
-    ("MODULE m\nRECORD\nnum x;\nENDRECORD\nENDMODULE", [1, 3, 4, 5]),
     ("MODULE m\nALIAS num;\nVAR num x;\nENDMODULE", [1, 3, 4]),
     ("MODULE m\nLOCAL num x;\nVAR num x;\nENDMODULE", [1, 3, 4]),
     ("MODULE m\nERROR(a\nRETRY;\nENDMODULE", [1, 3, 4]),

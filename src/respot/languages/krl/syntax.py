@@ -62,7 +62,7 @@ def read_statements(text: str, line_starts: list[int]) -> list[Statement]:
     add = statements.append
     known = _LINES
     ends = [*line_starts[1:], len(text)]
-    for number, start, end, key in zip(count(1), line_starts, ends, SHAPES.keys(text), strict=False):
+    for number, start, end, key in zip(count(1), line_starts, ends, SHAPES.keys(text, line_starts), strict=False):
         try:
             line = known[key]
         except KeyError:

@@ -63,6 +63,7 @@ _HEADS = _words("PROC FUNC")
 #: Words that begin a simple statement; a compact IF may stand before them.
 _JUMPS = _words("RETURN GOTO RAISE EXIT RETRY TRYNEXT CONNECT")
 _WHOLE_JUMPS = _words("EXIT RETRY TRYNEXT")
+_MAYBE_WHOLE = _WHOLE_JUMPS | {"RETURN", "RAISE"}
 #: Words that stand nowhere but at the beginning of a statement.
 _FIRST = (
     _WHOLE
@@ -72,6 +73,7 @@ _FIRST = (
 _FIRST_IN_SIMPLE = _FIRST | _STORAGE
 #: Two names may follow these: a type and what is of it.
 _BEFORE_TYPE = _STORAGE | {"ALIAS"}
+_BEFORE_NAME = frozenset((".", "TRAP", "RECORD", "MODULE", "GOTO", "FOR"))
 _BEFORE_PARAMETER = _STORAGE | {"(", ",", "\\", "|", "INOUT"}
 #: Reserved words within a statement: the next line goes on with it.
 _WITHIN = _words("AND OR XOR NOT DIV MOD THEN DO FROM TO STEP WITH INOUT")
@@ -175,7 +177,7 @@ _MAY_END = re.compile(rf"[;:)]|\b(?:THEN|DO|END\w+|{_any_of(_FIRST_IN_SIMPLE)})\
 _SEMICOLON = re.compile(r'"[^"\r\n]*"|![^\r\n]*|;')
 #: A line that begins a statement whatever stands before it: no expression holds two operands in a row.
 _TWO_OPERANDS = re.compile(
-    rf"""[^\W\d]\w*(?:\s+(?!(?:{_any_of(_FIRST_IN_SIMPLE | _WITHIN)})\b)[^\W\d]|\s+[0-9.]|\s*["\[])""",
+    rf"""[^\W\d]\w*(?:\s+(?!(?:{_any_of(_FIRST_IN_SIMPLE | _WITHIN)})\b)[^\W\d]|\s+\.?[0-9]|\s*["\[])""",
     re.IGNORECASE,
 )
 _ASSIGNS = re.compile(r"[^\W\d]\w*(?:\s*\{[^}]*\}|\s*\.\s*[^\W\d]\w*)*\s*:=", re.IGNORECASE)
@@ -393,8 +395,8 @@ class _Reader:
         kinds = self._last_kinds(begun)
         before = kinds[-1]
         alone = begun.last in (begun.start, begun.joined) and len(kinds) == 1 and self._begins_line(begun.last)
-        if alone and before in _JUMPS:
-            return before in _WHOLE_JUMPS or self._indentation(start) <= self._indentation(begun.last)
+        if alone and before in _MAYBE_WHOLE:
+            return before in _WHOLE_JUMPS or self._indentation(start) <= self._indentation(begun.start)
         if not _is_operand(before):
             return not compact and before not in _BEFORE_TYPE and _begins_anyway(line, before)
         if compact:
@@ -404,7 +406,7 @@ class _Reader:
             return False
         if alone:
             # a procedure without arguments and no `;`, or one whose arguments stand in the next line: further right
-            return self._indentation(start) <= self._indentation(begun.last)
+            return self._indentation(start) <= self._indentation(begun.start)
         return True
 
     def _leaves_head(self, begun: _Begun) -> bool:
@@ -491,7 +493,7 @@ def _is_operand(kind: str) -> bool:
 
 def _begins_anyway(line: str, before: str) -> bool:
     """Whether a line begins a statement although an operand is missing in the one before it."""
-    if before == ".":
+    if before in _BEFORE_NAME:
         return False
     if _TWO_OPERANDS.match(line):
         return True
