@@ -96,7 +96,13 @@ def open_backup(path: Path) -> Backup:
 
 
 def read_files(path: Path) -> dict[str, bytes]:
-    """Return every file of a folder or zip, or a program file with its data list, by path with ``/``; errors as above."""
+    """Return every file of a folder or zip, or a program file with its data list, by path with ``/``.
+
+    Raises
+    ------
+    BadInputError
+        As `open_backup`.
+    """
     try:
         if path.is_dir():
             return _read_folder(path)

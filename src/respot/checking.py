@@ -1,7 +1,7 @@
 """Does respot understand a file, and can it write it back? The work behind `respot check`.
 
-A file round-trips if every number of every statement, parsed into its exact value and its style and rendered through the
-template of its language between the gaps that the file has, gives the file's bytes again.
+A file round-trips if every number of every statement, parsed into its exact value and its style and rendered through
+the template of its language between the gaps that the file has, gives the file's bytes again.
 """
 
 from __future__ import annotations

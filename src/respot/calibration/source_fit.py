@@ -119,7 +119,10 @@ def _fit_issues(fit: SpotFit, source: Source, reference: Source) -> list[Issue]:
     if fit.match is not None:
         issues += _listed("UNMATCHED_SOURCE", fit.match.missing, f"not in {reference.path}", source.path)
         issues += _listed("UNMATCHED_REFERENCE", fit.match.extra, f"not in {source.path}", reference.path)
-    issues += [Issue("EXCHANGED_NAMES", effect.remedy.text) for effect in fit.effects if effect.name == "swapped_ids"]
+    for effect in fit.effects:
+        if effect.name == "swapped_ids":
+            names = ", ".join(str(name) for name in effect.where["ids"])
+            issues.append(Issue("EXCHANGED_NAMES", f"{names} carry each other's names in one of the two lists"))
     if not fit.support.supported:
         issues.append(Issue("ROTATION_NOT_SUPPORTED", fit.support.verdict))
     errors = np.linalg.norm(fit.robust.rigid.residuals, axis=1)

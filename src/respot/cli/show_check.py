@@ -20,8 +20,11 @@ def show_files(files: Sequence[CheckedFile], totals: Mapping[str, float]) -> Non
     columns += [Column("newline", number=False), Column("bytes"), Column("statements"), Column("opaque")]
     columns += [Column("round trip", number=False)]
     rows = [
-        [file.path, file.language, file.encoding, file.newline, str(file.bytes), str(file.statements), str(file.opaque)]
-        + ["yes" if file.roundtrip else "NO"]
+        [
+            *(file.path, file.language, file.encoding, file.newline),
+            *(str(file.bytes), str(file.statements), str(file.opaque)),
+            "yes" if file.roundtrip else "NO",
+        ]
         for file in worth
     ]
     if rows:

@@ -45,6 +45,8 @@ _LINE = re.compile(r"[^\r\n]*(?:\r*\n|\r)|[^\r\n]+\Z")
 _NO_WORDS = frozenset(("NAME", "COMMENT", "STRING"))
 #: Names of the groups of a token pattern whose tokens stand for each other, and their kinds.
 _CLASSES = {"name": "a", "number": "0", "string": '"'}
+#: Kind of a quote that no other closes: it must not pass for a string.
+_OPEN_STRING = '"?'
 
 
 @dataclass(frozen=True)
@@ -219,6 +221,8 @@ class Shapes:
         group = None if match is None else match.lastgroup
         if group == "comment":
             return ""
+        if group is None and token == '"':
+            return _OPEN_STRING
         if group is None or (group == "name" and self._keyword.fullmatch(token)):
             return token.upper()
         return _CLASSES.get(group, group)
@@ -247,6 +251,8 @@ class Shapes:
             fault = None if _at_end(error) else _covering(spans, error.pos_in_stream or 0)
             reason = "ends too early" if fault is None else f"{_described(kinds, fault)} is not expected here"
             return Shape(OPAQUE, None, reason, self._lexicon, kinds, fault)
+        except KeyError:  # a grammar whose words may run together, as in STEP5
+            return Shape(OPAQUE, None, "two words run together", self._lexicon, kinds)
         if branch is None:
             return self.opaque(f"a tree deeper than {DEEPEST_TREE}")
         return Shape(branch.kind, branch, "", self._lexicon, kinds)
@@ -270,6 +276,8 @@ class _Parser:
         ------
         UnexpectedInput
             The grammar does not know the statement.
+        KeyError
+            The grammar cuts the text into other tokens.
         """
         positions = {start: position for position, (start, _) in enumerate(spans)}
         return self._branch(self.lark.parse(text), positions, 0)
@@ -325,7 +333,8 @@ def _described(kinds: tuple[str, ...], position: int | None) -> str:
     if position is None:
         return "a character"
     kind = kinds[position]
-    return {"a": "a name", "0": "a number", '"': "a string"}.get(kind, kind if kind.islower() else repr(kind))
+    described = {"a": "a name", "0": "a number", '"': "a string", _OPEN_STRING: "a string without an end"}
+    return described.get(kind, kind if kind.islower() else repr(kind))
 
 
 def _lexicon(token: re.Pattern[str]) -> Lexicon:

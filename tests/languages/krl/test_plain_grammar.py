@@ -5,6 +5,7 @@ Statements are made from the grammar's own rules, so that no rule is forgotten.
 
 from __future__ import annotations
 
+import re
 from functools import cache
 
 import pytest
@@ -108,6 +109,8 @@ def _tokens(draw: st.DrawFn, name: str, depth: int) -> list[str]:
             tokens += _tokens(draw, str(item.name), depth + 1)
         elif item.name in SAMPLES:
             tokens.append(draw(st.sampled_from(SAMPLES[item.name])))
+        elif item.name[0] == "_":
+            tokens.append(item.name[1:])  # a word of the language
         else:
             tokens.append(_literals()[item.name])
     return tokens
@@ -220,8 +223,10 @@ def test_most_made_up_statements_are_known():
 
 
 def test_every_terminal_has_samples():
-    named = {term.name for term in SHAPES.lark.terminals if term.pattern.type == "re"}
-    assert named <= {*SAMPLES, "COMMENT", "BLANK", "_NL"}
+    named = {term.name for term in SHAPES.lark.terminals if term.pattern.type == "re" and term.name[0] != "_"}
+    assert named <= {*SAMPLES, "COMMENT", "BLANK"}
+    words = {term for term in SHAPES.lark.terminals if term.name[0] == "_" and term.name != "_NL"}
+    assert all(re.fullmatch(term.pattern.to_regexp(), term.name[1:]) for term in words)
 
 
 def test_fixtures(program, read):

@@ -19,7 +19,7 @@ TOKEN = re.compile(
     | (?P<string>"[^"\r\n]*")
     | (?P<bits>'[BbHhDd]?[0-9A-Fa-f]+')
     | (?P<header>&[^\r\n]*)
-    | (?P<path>/[\w$/]+\.\.[\w$]+)
+    | (?P<path>(?:/[\w$]+)+\.\.[\w$]+)
     | == | <> | <= | >=
     | [^\ \t\f\r\n\x1a\xa0]
     """,
