@@ -295,6 +295,13 @@ def test_parallel_linkage_keeps_cfx_and_refuses_what_is_ambiguous():
     assert result.joints[0] == pytest.approx(after)
 
 
+def test_a_large_travel_of_one_axis_does_not_hide_the_others():
+    # almost stretched: both elbow branches are near, and axis 1 alone travels most in both
+    joints = [0.15, 0.15, -0.75, 0.15, -0.15, 0.15]
+    result = moved(PRIME, joints, [-2.85, *joints[1:]])
+    assert result.joints[0] == pytest.approx([-2.85, *joints[1:]])
+
+
 @given(ANGLES, st.floats(-4, 4))
 def test_rotation_about_the_robot_base_only_turns_axis_one(joints, turn):
     joints = np.array(joints)

@@ -235,9 +235,9 @@ def _differ(solutions: Array) -> bool:
 
 
 def _nearest(model: OpwRobot, branches: Array, old_joints: Array) -> Array:
-    """Of all solutions (n, 8, 6), with their full turns, the one with the smallest largest travel, shape (n, 6)."""
+    """Of all solutions (n, 8, 6), with their full turns, the one nearest to the old joints (n, 6), same shape."""
     turned = nearest_turn(branches, old_joints[:, None, :], model.revolute)
-    travel = np.abs(turned - old_joints[:, None, :]).max(axis=-1)
+    travel = np.linalg.norm(turned - old_joints[:, None, :], axis=-1)
     best = np.argmin(np.where(np.isfinite(travel), travel, np.inf), axis=1)
     return np.asarray(turned[np.arange(len(best)), best])
 

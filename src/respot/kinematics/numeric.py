@@ -1,7 +1,8 @@
 """Inverse kinematics by damped least squares, for robots without a closed form; vectorised over the poses.
 
-Levenberg-Marquardt on the pose error, each pose with its own damping (Marquardt's rule); a step that makes a pose
-worse is taken back. Poses that do not converge start again from other joints.
+Levenberg-Marquardt on the pose error, damped in proportion to the squared error (Sugihara, IEEE Trans. Robotics 27, 2011)
+so that it converges fast at singular joints too; the factor is each pose's own, and a step that makes a pose worse is
+taken back. Poses that do not converge start again from other joints.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ def solve(
     error, chain = _error(steps, joints, goal_r, goal_p, size_mm)
     jacobian = _scaled(chain, places, size_mm, spans)
     cost = np.sum(error**2, axis=1)
-    damping = np.full(count, 1e-2)
+    damping = np.full(count, 0.1)
     active = np.arange(count)
     goal = (REACHED_MM / size_mm) ** 2
     for _ in range(ITERATIONS):
@@ -59,7 +60,7 @@ def solve(
             break
         j, e = jacobian[active], error[active]
         normal = np.einsum("nki,nkj->nij", j, j)
-        normal += (damping[active, None] * np.maximum(np.einsum("nii->ni", normal), 1e-6))[:, :, None] * np.eye(axes)
+        normal += (damping[active] * cost[active] + 1e-15)[:, None, None] * np.eye(axes)
         step = np.linalg.solve(normal, np.einsum("nki,nk->ni", j, e)[:, :, None])[:, :, 0]
         trial = joints[active] + step * spans
         trial_error, trial_chain = _error(steps, trial, goal_r[active], goal_p[active], size_mm)
@@ -68,8 +69,8 @@ def solve(
         taken = active[better]
         joints[taken], error[taken], cost[taken] = trial[better], trial_error[better], trial_cost[better]
         jacobian[taken] = _scaled(trial_chain, places, size_mm, spans)[better]
-        damping[taken] = np.maximum(damping[taken] * 0.2, 1e-12)
-        damping[active[~better]] = np.minimum(damping[active[~better]] * 5.0, 1e6)
+        damping[taken] = np.maximum(damping[taken] * 0.3, 1e-4)
+        damping[active[~better]] *= 4.0
     # within a thousandth of a micrometre is reached too where rounding stops the descent
     return joints, cost <= 1e4 * goal
 

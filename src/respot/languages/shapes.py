@@ -47,6 +47,7 @@ _NO_WORDS = frozenset(("NAME", "COMMENT", "STRING"))
 _CLASSES = {"name": "a", "number": "0", "string": '"'}
 #: Kind of a quote that no other closes: it must not pass for a string.
 _OPEN_STRING = '"?'
+_QUOTE = '"'
 
 
 @dataclass(frozen=True)
@@ -221,7 +222,7 @@ class Shapes:
         group = None if match is None else match.lastgroup
         if group == "comment":
             return ""
-        if group is None and token == '"':
+        if group is None and token == _QUOTE:
             return _OPEN_STRING
         if group is None or (group == "name" and self._keyword.fullmatch(token)):
             return token.upper()

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
+from functools import cached_property
 
-from respot.languages.shapes import Part, Shapes, Splitter, Unit
-from respot.program.statement import OPAQUE, Branch, Leaf, Shape
+from respot.languages.shapes import MOST_SHAPES, Part, Shapes, Splitter, Unit
+from respot.program.statement import OPAQUE, Branch, Leaf, Numbers, Shape
 from respot.source import Span
 
 _LITERALS = {"0": ("number", "NUMBER"), '"': ("string", "STRING"), "TRUE": ("boolean", "BOOLEAN")}
@@ -21,26 +22,122 @@ _SIGNS = ("+", "-")
 _LARGE = 200
 #: Tokens of a statement whose shape is worth keeping: none of a longer table is met again.
 _LARGEST_KEPT = 20_000
+#: Tokens of a statement for which a pattern with a group for each is made, and how often it must be met for it.
+_MOST_GROUPS = 500
+_RARE = 3
 #: Deeper ones are left to the grammar, which refuses them.
 _DEEPEST = 50
 
 
 class Rows(Branch):
-    """A large aggregate of literals; its tree is built when it is asked for."""
+    """An aggregate of literals; its tree is built when it is asked for, and kept unless it is large."""
 
     _kinds: tuple[str, ...]
+    _built: tuple[Branch | Leaf, ...] | None
 
     @classmethod
     def over(cls, kinds: tuple[str, ...], first: int, last: int) -> Rows:
         """Lay it over the tokens ``first`` to ``last``."""
         rows = cls("aggregate", (), first, last)
         rows._kinds = kinds
+        rows._built = None
         return rows
 
     @property
     def children(self) -> tuple[Branch | Leaf, ...]:
         """The rows."""
-        return _aggregate(self._kinds, self.first)[0].children
+        if self._built is not None:
+            return self._built
+        built = _aggregate(self._kinds, self.first)[0].children
+        if self.last - self.first <= _LARGE:
+            self._built = built
+        return built
+
+
+class Unsigned:
+    """What the shapes have in common that differ in the signs of literals only: a pattern for all of them.
+
+    Ten numbers of a target have a thousand combinations of signs, and a pattern takes milliseconds to make.
+
+    Parameters
+    ----------
+    shape : LaidShape
+        Any of them.
+    taken : list of Span
+        Its aggregates of literals.
+    """
+
+    def __init__(self, shape: LaidShape, taken: list[Span]) -> None:
+        self.used = 0
+        self._shape = shape
+        self._literal = [False] * len(shape.kinds)
+        for first, last in taken:
+            self._literal[first : last + 1] = [True] * (last + 1 - first)
+
+    @cached_property
+    def tokens(self) -> re.Pattern[str]:
+        """One group for each token; that of a sign may be empty."""
+        lexicon = self._shape.lexicon
+        pieces = [f"({lexicon.pattern_of(kind)})" for kind in self._shape.kinds]
+        return self._pattern(pieces, rf"(?:([-+]){lexicon.gap})?")
+
+    @cached_property
+    def numbers(self) -> re.Pattern[str]:
+        """One group for each number with its sign."""
+        lexicon = self._shape.lexicon
+        pieces = [lexicon.pattern_of(kind) for kind in self._shape.kinds]
+        for first, last in self._shape.number_places():
+            if not self._literal[last]:
+                pieces[first] = f"({pieces[first]}"
+                pieces[last] = f"{pieces[last]})"
+        return self._pattern(pieces, rf"((?:[-+]{lexicon.gap})?", ")")
+
+    def _pattern(self, pieces: list[str], before: str, after: str = "") -> re.Pattern[str]:
+        """Join the patterns of the tokens; any number among literals may have a sign."""
+        joined: list[str] = []
+        for piece, kind, literal in zip(pieces, self._shape.kinds, self._literal, strict=True):
+            if not literal or kind not in (*_SIGNS, "0"):
+                joined.append(piece)
+            elif kind == "0":
+                joined.append(f"{before}{piece}{after}")
+        return re.compile(self._shape.lexicon.gap.join(joined), self._shape.lexicon.flags)
+
+
+class LaidShape(Shape):
+    """A shape whose literals did not pass the grammar."""
+
+    unsigned: Unsigned | None = None
+
+    def number_places(self) -> list[Span]:
+        """First and last token of every number with its sign."""
+        return [(first, last) for _, first, last in self._places.numbers]
+
+    def spans(self, text: str, start: int, end: int) -> list[Span]:
+        """Spans of the tokens of a statement of this shape."""
+        unsigned = self._often()
+        if unsigned is not None:
+            match = unsigned.tokens.match(text, start, end)
+            found = [] if match is None else [span for span in match.regs[1:] if span[0] >= 0]
+            if len(found) == len(self.kinds):
+                return found
+        tokens = self.lexicon.token.finditer(text, start, end)
+        return [match.span() for match in tokens if match.lastindex is None]
+
+    def numbers(self, text: str, start: int, end: int) -> Numbers:
+        """Numbers of a statement of this shape."""
+        unsigned = self._often()
+        if unsigned is not None:
+            match = unsigned.numbers.match(text, start, end)
+            if match is not None:
+                return Numbers(("",) * len(match.groups()), match.groups(), match.regs[1:])
+        return super().numbers(text, start, end)
+
+    def _often(self) -> Unsigned | None:
+        """Return the common patterns if they are worth making."""
+        if self.unsigned is None:
+            return None
+        self.unsigned.used += 1
+        return self.unsigned if self.unsigned.used > _RARE else None
 
 
 class RapidShapes(Shapes):
@@ -64,6 +161,7 @@ class RapidShapes(Shapes):
     ) -> None:
         super().__init__(grammar, start, token, split)
         self._end = end
+        self._unsigned: dict[tuple[str, ...], Unsigned] = {}
 
     def last(self, text: str) -> tuple[Part, ...]:
         """Statements of a run of lines that ends with the statement it began, whole or not."""
@@ -93,13 +191,37 @@ class RapidShapes(Shapes):
         shape = self._parts.get(kinds)
         if shape is None:
             taken = literal_aggregates(kinds)
-            kept = _kept(len(kinds), taken)
-            if len(kept) == len(kinds):
+            if not any(last - first > 1 for first, last in taken):
                 return None
-            shape = self._laid(self._without(text, first, kept), kinds, kept, dict(taken))
+            shape = self._laid(text, kinds, first, taken)
             if len(kinds) <= _LARGEST_KEPT:
                 self._parts[kinds] = shape
         return shape
+
+    def _laid(self, text: str, kinds: tuple[str, ...], first: int, taken: list[Span]) -> Shape:
+        """Shape of a statement from that of what is left of it without the literals."""
+        kept = _kept(len(kinds), taken)
+        short = self._parts.get(tuple(kinds[position] for position in kept)) or self._without(text, first, kept)
+        if short.tree is None:
+            fault = None if short.fault is None else kept[short.fault]
+            return Shape(OPAQUE, None, short.reason, short.lexicon, kinds, fault)
+        tree = _lay(short.tree, kept, dict(taken), kinds)
+        shape = LaidShape(tree.kind, tree, "", short.lexicon, kinds)
+        if len(kinds) <= _MOST_GROUPS:
+            shape.unsigned = self._unsigned_of(shape, taken)
+        return shape
+
+    def _unsigned_of(self, shape: LaidShape, taken: list[Span]) -> Unsigned:
+        key: list[str] = []
+        at = 0
+        for first, last in taken:
+            key += shape.kinds[at:first]
+            key += (kind for kind in shape.kinds[first : last + 1] if kind not in _SIGNS)
+            at = last + 1
+        key += shape.kinds[at:]
+        if len(self._unsigned) >= MOST_SHAPES:
+            self._unsigned.clear()
+        return self._unsigned.setdefault(tuple(key), Unsigned(shape, taken))
 
     def _without(self, text: str, first: int, kept: list[int]) -> Shape:
         """Shape of a statement of which only some tokens are kept."""
@@ -107,14 +229,6 @@ class RapidShapes(Shapes):
         tokens = (token for match in self._words.finditer(text) if self._kinds[token := match.group()])
         words = [token for position, token in enumerate(tokens) if position in wanted]
         return super()._shape(" ".join(words), list(map(self._kinds.__getitem__, words)), 0, len(words) - 1)
-
-    def _laid(self, short: Shape, kinds: tuple[str, ...], kept: list[int], taken: dict[int, int]) -> Shape:
-        """Shape of a statement from that of what is kept of it."""
-        if short.tree is None:
-            fault = None if short.fault is None else kept[short.fault]
-            return Shape(OPAQUE, None, short.reason, short.lexicon, kinds, fault)
-        tree = _lay(short.tree, kept, taken, kinds)
-        return Shape(tree.kind, tree, "", short.lexicon, kinds)
 
 
 def literal_aggregates(kinds: Sequence[str]) -> list[Span]:
@@ -174,7 +288,7 @@ def _lay(tree: Branch, kept: list[int], taken: dict[int, int], kinds: tuple[str,
         return tree
     first, last = kept[tree.first], kept[tree.last]
     if tree.kind == "aggregate" and taken.get(first) == last:
-        return Rows.over(kinds, first, last) if last - first > _LARGE else _aggregate(kinds, first)[0]
+        return Rows.over(kinds, first, last)
     children = tuple(
         _lay(child, kept, taken, kinds) if isinstance(child, Branch) else Leaf(kept[child.position], child.type)
         for child in tree.children
