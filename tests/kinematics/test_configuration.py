@@ -194,6 +194,8 @@ def test_leaving_the_limits_names_axis_and_angle():
     result = moved(PRIME, [10, -80, 90, 349, 40, 20], [10, -80, 90, 351, 40, 20])
     assert result.reasons[0].code == "OUT_OF_LIMITS"
     assert "axis 4" in str(result.reasons[0]) and "351.000" in str(result.reasons[0])
+    result = moved(PRIME, [0.4, -80, 90, 349, 40, 20], [-0.4, -80, 90, 351, 40, 20])
+    assert result.reasons[0].code == "OUT_OF_LIMITS"
     assert result.configuration.tolist() == [[2, 2]]  # the old numbers, untouched
 
 
@@ -223,6 +225,13 @@ def test_numbers_that_fit_no_solution_are_not_guessed():
         result = moved(IRB6700, joints, joints, [wrong])
         assert result.reasons[0].code == "CONFIG_INCONSISTENT", wrong
         assert "[0,0,0,0]" in str(result.reasons[0])
+
+
+def test_without_limits_a_wrong_quadrant_is_still_wrong():
+    free = dataclasses.replace(IRB6700, model=IRB6700.model.with_limits(None))
+    joints = [10, 5, 5, 20, 40, 20]
+    assert moved(free, joints, joints, [[0, 1, 0, 0]]).reasons[0].code == "CONFIG_INCONSISTENT"
+    assert moved(free, joints, joints, [[0, 4, 0, 0]]).joints[0, 3] == pytest.approx(380)
 
 
 def test_a_taught_pose_out_of_reach_blames_the_model():

@@ -140,12 +140,13 @@ def test_abb_notes():
     assert cell.notes == ("joint bounds of axis 4, 5, 6 unknown",) and np.isinf(cell.limits[3]).all()
 
 
-def test_abb_base_frames_write_only_what_is_not_the_default():
+@pytest.mark.parametrize("explicit", [True, False])
+def test_abb_base_frames_write_only_what_is_not_the_default(explicit):
     names = ("pos_x", "pos_y", "pos_z", "orient_u0", "orient_u3")
     bare = rows(**{f"base_frame_{name}": None for name in names})
     assert cell_of(changed(ABB, **bare), "rapid").robroot.as_matrix() == pytest.approx(np.eye(4))
     # EdgarIvanMM/Tamponadora hangs upside down: u0 0, u1 1
-    bare["ROBOT"][0] |= {"base_frame_orient_u0": "0", "base_frame_orient_u1": "1"}
+    bare["ROBOT"][0] |= {"base_frame_orient_u1": "1"} | ({"base_frame_orient_u0": "0"} if explicit else {})
     hanging = cell_of(changed(ABB, **bare), "rapid").robroot.rotation.as_matrix()
     assert hanging == pytest.approx(np.diag([1, -1, -1]), abs=1e-12)
 

@@ -1,8 +1,8 @@
 """Inverse kinematics by damped least squares, for robots without a closed form; vectorised over the poses.
 
-Levenberg-Marquardt on the pose error, damped in proportion to the squared error (Sugihara, IEEE Trans. Robotics 27, 2011)
-so that it converges fast at singular joints too; the factor is each pose's own, and a step that makes a pose worse is
-taken back. Poses that do not converge start again from other joints.
+Levenberg-Marquardt on the pose error, damped in proportion to the squared error (Sugihara, IEEE Trans. Robotics 27,
+2011) so that it converges fast at singular joints too; the factor is each pose's own, and a step that makes a pose
+worse is taken back. Poses that do not converge start again from other joints.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from operator import sub
+from operator import itemgetter, sub
 from typing import Generic, TypeVar
 
 from lark import Lark, Token, Tree
@@ -156,11 +156,13 @@ class Shapes:
         Lines with the same key have the same tokens at the same place from either end, apart from the digits. A line
         that is too long to be a statement is its own key.
         """
-        if line_starts and max(map(sub, [*line_starts[1:], len(text)], line_starts)) <= LONGEST_STATEMENT:
+        if line_starts is None:
+            longest = max(map(len, _LINE.findall(text)), default=0)
+        else:
+            longest = max(map(sub, [*line_starts[1:], len(text)], line_starts))
+        if longest <= LONGEST_STATEMENT:
             return _LINE.findall(self._digits.sub("0", text))
         lines = _LINE.findall(text)
-        if max(map(len, lines), default=0) <= LONGEST_STATEMENT:
-            return _LINE.findall(self._digits.sub("0", text))
         return [line if len(line) > LONGEST_STATEMENT else self._digits.sub("0", line) for line in lines]
 
     def unit(self, text: str, key: str | None = None) -> Unit:
@@ -326,7 +328,7 @@ def _at_end(error: UnexpectedInput) -> bool:
 
 def _covering(spans: list[Span], offset: int) -> int:
     """Position of the token at an offset, or before it."""
-    return max(0, bisect_right(spans, (offset, len(spans) + offset)) - 1)
+    return max(0, bisect_right(spans, offset, key=itemgetter(0)) - 1)
 
 
 def _described(kinds: tuple[str, ...], position: int | None) -> str:

@@ -38,6 +38,7 @@ def test_must_be_opaque(text, read):
     ("text", "reason", "fault"),
     [
         ("PTP XP1 XP2", "a name is not expected here", "XP2"),
+        ("interrupt A_LONG_NAME on", "a name is not expected here", "A_LONG_NAME"),
         ("a := b", "'=' is not expected here", "="),
         ("WAIT FOR a AND", "ends too early", "WAIT FOR a AND"),
         ("DECL E6POS P={X 1 Y 2}", "a name is not expected here", "Y"),
