@@ -50,6 +50,7 @@ CODES: dict[str, tuple[Level, str]] = {
     "UNKNOWN_ENCODING": (_W, "the bytes of a file fit no code page of its language"),
     "BINARY_MODULE": (_I, "an encoded module; it is copied as it is"),
     "NOT_A_PROGRAM": (_I, "a file with a program's name that is something else; it is copied as it is"),
+    "SEVERAL_MODULES": (_E, "a file with more than one module; it is copied as it is"),
     "UNKNOWN_FRAME": (_E, "the base or work object of a target is not known"),
     "UNKNOWN_TOOL": (_W, "the tool of a target is not known"),
     "UNKNOWN_TARGET": (_E, "a motion goes to a target that is not declared"),

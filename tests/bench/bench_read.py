@@ -1,6 +1,6 @@
 """How fast programs are read, against the plain grammar, in one run.
 
-Usage: ``python tests/bench/bench_read.py [--megabytes 5] [--repeat 3] [--memory] [--corpus PATH...]``
+Usage: ``python tests/bench/bench_read.py [--megabytes 5] [--repeat 3] [--memory] [--peers PYTHON] [--corpus PATH...]``
 
 Both sides turn bytes into statements and read every number of every member of every aggregate, as a number with its place;
 what they find is compared. The baseline is our own grammar on the whole file: Lark, LALR, contextual lexer, Python's
@@ -10,9 +10,13 @@ default garbage collector. ``--corpus`` takes what `scripts/corpus.py` takes; wi
 from __future__ import annotations
 
 import argparse
+import importlib
+import json
 import random
 import re
+import subprocess
 import sys
+import tempfile
 import time
 import tracemalloc
 from collections.abc import Callable, Iterator
@@ -238,8 +242,8 @@ def rapid_programs(size: int, seed: int = 4) -> list[bytes]:
     total = 0
     while total < size:
         lines = ["%%%", "  VERSION:1", "  LANGUAGE:ENGLISH", "%%%", "", f"MODULE Style{len(programs)}"]
-        for index in range(dice.randrange(5, 30)):
-            lines.append(f"  CONST robtarget p{index}0:={_rapid_target(dice)};")
+        points = range(dice.randrange(5, 30))
+        lines += [f"  CONST robtarget p{index}0:={_rapid_target(dice)};" for index in points]
         for index in range(dice.randrange(3, 9)):
             lines += ["", f"  PROC rPart{index}(num count\\switch fast)"]
             for _ in range(dice.randrange(10, 50)):
@@ -404,6 +408,64 @@ def memory(name: str, data: bytes, language: Language) -> None:
     print(f"{name:24} statements {held / len(data):5.1f}x the file, peak {peak / len(data):5.1f}x")
 
 
+#: Other readers in Python: name -> language and what to run, which prints seconds and files read in full.
+PEERS = {
+    "krllint": (
+        "krl",
+        """
+import contextlib, io, json, sys, time
+from krllint.linter import Linter
+paths, sys.argv = sys.argv[1:], ["krllint", "."]
+linter, read, begin = Linter(), 0, time.process_time()
+for path in paths:
+    with contextlib.suppress(Exception), contextlib.redirect_stdout(io.StringIO()):
+        linter._lint_file(path)
+        read += 1
+print(json.dumps([time.process_time() - begin, read]))
+""",
+    ),
+    "rapidchecker": (
+        "rapid",
+        """
+import contextlib, json, sys, time
+from rapidchecker.check import check_format
+read, begin = 0, time.process_time()
+for path in sys.argv[1:]:
+    with contextlib.suppress(Exception):
+        text = open(path, encoding="latin-1").read()
+        read += not check_format(text)
+print(json.dumps([time.process_time() - begin, read]))
+""",
+    ),
+}
+_PEER_FILES, _PEER_SECONDS = 30, 100
+
+
+def peers(python: str, name: str, files: list[bytes], language: str) -> None:
+    """Print how fast other readers are on a part of the same input, and how many files they can read."""
+    part = files[:: max(1, len(files) // _PEER_FILES)]
+    with tempfile.TemporaryDirectory() as folder:
+        paths = []
+        for index, data in enumerate(part):
+            path = Path(folder) / f"a{index}{'.src' if language == 'krl' else '.mod'}"
+            path.write_bytes(data)
+            paths.append(str(path))
+        for peer, (spoken, code) in PEERS.items():
+            if spoken != language:
+                continue
+            try:
+                done = subprocess.run(
+                    [python, "-c", code, *paths], capture_output=True, timeout=_PEER_SECONDS, check=True
+                )
+                seconds, read = json.loads(done.stdout)
+                rate = sum(map(len, part)) / 1e6 / seconds
+                print(f"{name:24} {peer}: {rate:.3f} MB/s, {read} of {len(part)} files read")
+            except subprocess.TimeoutExpired:
+                print(f"{name:24} {peer}: not done after {_PEER_SECONDS} s with {sum(map(len, part)) / 1e6:.2f} MB")
+            except subprocess.CalledProcessError:
+                print(f"{name:24} {peer}: not installed")
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
@@ -412,6 +474,7 @@ def main() -> None:
     parser.add_argument("--memory", action="store_true")
     parser.add_argument("--language", choices=sorted(LANGUAGES), action="append")
     parser.add_argument("--corpus", type=Path, nargs="+", default=[], help="repositories of real programs")
+    parser.add_argument("--peers", metavar="PYTHON", help="a Python that has krllint and rapidchecker: run them too")
     arguments = parser.parse_args()
     size = int(arguments.megabytes * 1e6)
     cases: list[tuple[str, str, list[bytes]]] = [
@@ -422,7 +485,7 @@ def main() -> None:
         ("RAPID programs, made up", "rapid", rapid_programs(size)),
     ]
     if arguments.corpus:
-        import corpus  # a script beside the package
+        corpus = importlib.import_module("corpus")  # a script beside the package
 
         for language, recognised in (("krl", _is_krl), ("rapid", looks_like_rapid)):
             found = [
@@ -432,11 +495,23 @@ def main() -> None:
                 for _, data in corpus.files(place, corpus.LANGUAGES[language].suffixes)
             ]
             programs = [data for data in found if recognised(data)]
-            cases.append((f"{language.upper()} programs, corpus", language, programs))
+            if programs:
+                cases.append((f"{language.upper()} programs, corpus", language, programs))
     cases = [case for case in cases if not arguments.language or case[1] in arguments.language]
     print(f"{'':24} {'MB':>7} {'files':>9} {'Lark MB/s':>9} {'ours MB/s':>9} {'ratio':>8} {'different':>9}")
     for name, language, files in cases:
         measure(name, files, LANGUAGES[language], arguments.repeat)
+    if arguments.peers:
+        small = [
+            ("KRL point table", "krl", [krl_table(100_000)]),
+            ("KRL programs, made up", "krl", krl_programs(200_000)),
+            ("RAPID point table", "rapid", [rapid_table(20_000)]),
+            ("RAPID programs, made up", "rapid", rapid_programs(60_000)),
+            *(case for case in cases if case[0].endswith("corpus")),
+        ]
+        for name, language, files in small:
+            if not arguments.language or language in arguments.language:
+                peers(arguments.peers, name, files, language)
     if arguments.memory:
         for name, language, files in cases:
             if len(files) == 1:

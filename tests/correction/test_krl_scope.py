@@ -44,7 +44,7 @@ def test_a_program_that_shares_a_moved_point_is_refused_with_it(tmp_path):
     other = "DEF other( )\n" + lin("S1X", "XS1X", weld=True) + lin("GATE") + "END\n"
     other_dat = "DEFDAT OTHER\n" + krl_point("S1X", 0, 0, 0) + fdat("S1X") + fdat("GATE") + "ENDDAT\n"
     files = krl(
-        body=lin("GATE") + "LIN CALC(XS1)\n",
+        body=lin("GATE") + "LIN CALC(1)\n",
         data=fdat("GATE"),
         more={"shared.dat": shared, "other.src": other, "other.dat": other_dat},
     )
@@ -66,7 +66,7 @@ def test_programs_that_share_a_point_are_corrected_together(tmp_path):
 
 
 def test_partial_corrects_the_rest(tmp_path):
-    files = krl(body="LIN CALC(XS1)\n" + lin("P1"), data=krl_point("P1", 5, 6, 7) + fdat("P1"))
+    files = krl(body="LIN CALC(1)\n" + lin("P1"), data=krl_point("P1", 5, 6, 7) + fdat("P1"))
     assert convert(tmp_path, files).edited() == set()
     done = convert_again(tmp_path, tmp_path / "backup", "--partial", name="partial")
     assert done.code == 1

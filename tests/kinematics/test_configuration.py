@@ -297,7 +297,7 @@ def test_absolutely_accurate_robots_decide_nothing_near_a_border(by_bit):
 def test_parallel_linkage_keeps_cfx_and_refuses_what_is_ambiguous():
     narrow = np.array([[-180, 180], [-100, 110], [-60, 65], [-200, 200], [-120, 120], [-400, 400.0]])
     cell = RobotCell(find_robot("irb2400").with_limits(narrow), "rapid")
-    joints, after = [20, 30, -5, 40, 50, 60], [20, 31, -5, 40, 50, 95]
+    joints, after = [20, 30, -5, 40, -50, 60], [20, 31, -5, 40, -50, 95]
     result = moved(cell, joints, after, [[0, 0, 0, 0]])
     assert result.reasons == (None,)
     assert result.configuration.tolist() == [[0, 0, 1, 0]]

@@ -117,6 +117,21 @@ def test_forward_inverse_forward(name, joints):
     assert np.degrees((again.rotation * flange.rotation.inv()).magnitude()).max() < 1e-6
 
 
+@pytest.mark.parametrize("fifth", [0.0, 1e-8, -1e-6, 1e-4, 180.0, 30.0])
+@pytest.mark.parametrize("bend", [0.0, 1e-8, -1e-6, 1e-4, 60.0])
+@pytest.mark.parametrize("robot", [PRIME, IRB6700, find_robot("irb1600_6_12"), find_robot("irb2400")])
+def test_singular_poses_are_solved_as_exactly_as_others(robot, bend, fifth):
+    # axis 3 such that the arm is bent by so much from stretched
+    stretched = -math.degrees(math.atan2(robot.a2, robot.c3)) + robot.offsets_deg[2] + (20 if robot.coupled_23 else 0)
+    flange = robot.forward([10, 20, stretched + bend, 30, fifth, 40])
+    solutions = robot.inverse(flange)[0]
+    exists = np.isfinite(solutions).all(axis=1)
+    again = robot.forward(solutions[exists])
+    assert exists.any()
+    assert np.abs(again.translation - flange.translation).max(initial=0.0) < 1e-6
+    assert np.degrees((again.rotation * flange.rotation.inv()).magnitude()).max(initial=0.0) < 1e-7
+
+
 @given(names, ANGLES)
 def test_the_joints_are_among_the_branches(name, joints):
     robot = ROBOTS[name].model

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from scipy.spatial.transform import RigidTransform
 
 from respot.geometry import Array
+from respot.kinematics import numeric
 from respot.kinematics.chain import Step, X, Y, Z
 from respot.kinematics.model import RobotModel
 from respot.kinematics.turns import nearest_turn
@@ -24,6 +25,10 @@ if TYPE_CHECKING:
     from py_opw_kinematics import Robot
 
 LENGTHS = ("a1", "a2", "b", "c1", "c2", "c3", "c4")
+#: A wrist centre that rounding puts this far outside the reach of a stretched arm is reached.
+BOUNDARY_MM = 1e-9
+#: Below this sine of the elbow or of axis 5 the closed form is refined.
+SINGULAR = 1e-3
 #: No arm has a longer link [mm].
 LONGEST_MM = 10_000.0
 
@@ -121,12 +126,50 @@ class OpwRobot(RobotModel):
         found = np.full((len(matrices), 8, 6), np.nan)
         if finite.any():
             found[finite] = self._solver.reach(RigidTransform.from_matrix(matrices[finite])).joints + 0.0
+            self._stretch(found, matrices)
+            self._polish(found, matrices)
         if self.coupled_23:
             found[..., 2] += found[..., 1]
             found[..., 2] -= 360.0 * np.ceil((found[..., 2] - 180.0) / 360.0)
         if near is None:
             return found
         return nearest_turn(found, np.atleast_2d(np.asarray(near, dtype=float))[:, None, :], self.revolute)
+
+    def _stretch(self, serial: Array, matrices: Array) -> None:
+        """Fill in, in place, solutions (n, 8, 6) of a fully stretched arm, which rounding puts outside its reach.
+
+        The wrist centre is pulled a hair towards axis 2; `_polish` takes the rest away.
+        """
+        wrists = matrices[:, :3, 3] - self.c4 * matrices[:, :3, 2]
+        heading = np.arctan2(wrists[:, 1], wrists[:, 0])
+        for side in (self.a1, -self.a1):
+            shoulders = np.stack(
+                [side * np.cos(heading), side * np.sin(heading), np.full(len(wrists), self.c1)], axis=1
+            )
+            lever = shoulders - wrists
+            distance = np.linalg.norm(lever, axis=1)
+            rows = np.flatnonzero(np.abs(distance - self.c2 - np.hypot(self.a2, self.c3)) < BOUNDARY_MM)
+            if len(rows):
+                pulled = matrices[rows].copy()
+                pulled[:, :3, 3] += 2.0 * BOUNDARY_MM * lever[rows] / distance[rows, None]
+                retried = self._solver.reach(RigidTransform.from_matrix(pulled)).joints + 0.0
+                serial[rows] = np.where(np.isnan(serial[rows]), retried, serial[rows])
+
+    def _polish(self, serial: Array, matrices: Array) -> None:
+        """Refine, in place, solutions (n, 8, 6) at a stretched arm or a straight wrist.
+
+        The closed form takes an arc cosine near 1 there and loses half of its digits: 1e-8 rad, 1e-5 mm.
+        """
+        signs = np.array(self.signs, dtype=float)
+        theta = np.radians(serial[..., [2, 4]] * signs[[2, 4]] - np.array(self.offsets_deg)[[2, 4]])
+        theta[..., 0] += np.arctan2(self.a2, self.c3)
+        rows, branches = np.nonzero((np.abs(np.sin(theta)) < SINGULAR).any(axis=-1))
+        if not len(rows):
+            return
+        poses = RigidTransform.from_matrix(matrices[rows])
+        spans, size = np.full(6, np.degrees(1.0)), self.c2 + self.c3 + self.c4
+        refined, _ = numeric.solve(self.steps, poses, serial[rows, branches] * signs, size, spans)
+        serial[rows, branches] = refined * signs
 
     def with_parameters(self, changes: Mapping[str, float]) -> Self:
         """Return the robot with lengths ``a1`` .. ``c4`` [mm] and ``offset_1`` .. ``offset_6`` [deg] increased."""

@@ -25,6 +25,7 @@ class Forms:
     weld_instructions: re.Pattern[str] | None
     id_patterns: Sequence[re.Pattern[str]]
     data_id_patterns: Sequence[re.Pattern[str]]
+    harmless: frozenset[str]
     service: Sequence[re.Pattern[str]]
 
     @classmethod
@@ -38,6 +39,7 @@ class Forms:
             weld_instructions=re.compile(instructions, re.IGNORECASE) if instructions else None,
             id_patterns=_patterns(spot_id.get("names", [])),
             data_id_patterns=_patterns(spot_id.get("data", [])),
+            harmless=frozenset(name.upper() for name in data.get("harmless", {}).get("calls", [])),
             service=_patterns(data.get("service", {}).get("routines", [])),
         )
 
@@ -45,6 +47,10 @@ class Forms:
         """Whether a call welds."""
         first = arguments[0].upper() if arguments else ""
         return any(call.name == name.upper() and call.argument in ("", first) for call in self.weld_calls)
+
+    def is_harmless(self, name: str) -> bool:
+        """Whether a call is known to change neither frames nor positions."""
+        return name.upper() in self.harmless or any(call.name == name.upper() for call in self.weld_calls)
 
     def is_service(self, routine: str) -> bool:
         """Whether a routine looks after the gun, by its name."""

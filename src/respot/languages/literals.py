@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from decimal import Decimal, InvalidOperation
+from math import isfinite
 
 from respot.program.statement import Node
 from respot.program.targets import Number, Target
@@ -13,14 +14,16 @@ from respot.source import SourceText
 def number_of(node: Node) -> Number | None:
     """Return the number of a decimal literal with its sign, None for any other expression."""
     inner, negative = node, False
-    while inner.kind == "signed":
-        negative ^= inner.tokens("SIGN")[0].text == "-"
+    if inner.kind == "signed":
+        negative = inner.tokens("SIGN")[0].text == "-"
         inner = inner.nodes[-1]
     if inner.kind != "number":
         return None
     try:
         value = Decimal(inner.text)
     except InvalidOperation:
+        return None
+    if not isfinite(float(value)):  # no controller holds 1E400
         return None
     return Number(value.copy_negate() if negative else value, node.span)
 

@@ -38,6 +38,8 @@ _LONGEST_WORD = 40
 #: Numbers with a base are one run: ``0b12`` is two tokens, ``0b11`` one.
 _DIGITS = re.compile(r"0[xX][0-9A-Fa-f]+|0[oO][0-7]+|0[bB][01]+|[0-9]+")
 _PLAIN_DIGITS = re.compile(r"[0-9]+")
+#: Characters of a text whose digits are replaced at once.
+_PIECE = 256 * 1024
 #: A line with its end, as `respot.source.NEWLINE` cuts them.
 _LINE = re.compile(r"[^\r\n]*(?:\r*\n|\r)|[^\r\n]+\Z")
 
@@ -160,10 +162,16 @@ class Shapes:
             longest = max(map(len, _LINE.findall(text)), default=0)
         else:
             longest = max(map(sub, [*line_starts[1:], len(text)], line_starts))
-        if longest <= LONGEST_STATEMENT:
-            return _LINE.findall(self._digits.sub("0", text))
-        lines = _LINE.findall(text)
-        return [line if len(line) > LONGEST_STATEMENT else self._digits.sub("0", line) for line in lines]
+        if longest > LONGEST_STATEMENT:
+            lines = _LINE.findall(text)
+            return [line if len(line) > LONGEST_STATEMENT else self._digits.sub("0", line) for line in lines]
+        keys: list[str] = []
+        start = 0
+        while start < len(text):  # in pieces: a substitution holds all that it has found until its end
+            end = text.find("\n", start + _PIECE) + 1 or len(text)
+            keys += _LINE.findall(self._digits.sub("0", text[start:end]))
+            start = end
+        return keys
 
     def unit(self, text: str, key: str | None = None) -> Unit:
         """Statements of a run of lines without its last line end; None if it ends inside a statement.

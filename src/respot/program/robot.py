@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from respot.issues import Issue
 from respot.program.frames import Frame
@@ -13,16 +14,60 @@ from respot.program.targets import Target
 from respot.source import SourceText
 
 
+@dataclass(frozen=True)
+class Call:
+    """A call of a routine."""
+
+    name: str
+    line: int
+
+
+@dataclass(frozen=True)
+class Unread:
+    """A statement that no rule knows; what it does to the robot is not known either."""
+
+    line: int
+    text: str
+    reason: str
+
+
 @dataclass(frozen=True, eq=False)
 class Routine:
-    """A routine: its motions and the names of the routines it calls, in order."""
+    """A routine.
+
+    Parameters
+    ----------
+    name, program : str
+        Its name and the program it stands in.
+    path : str
+        File.
+    line : int
+        Line of its head.
+    steps : sequence of Move or Call
+        Its motions and calls, in order.
+    unread : sequence of Unread
+        Statements that no rule knows.
+    task : str
+        Task that runs it, where a controller has several.
+    """
 
     name: str
     program: str
     path: str
     line: int
-    moves: Sequence[Move]
-    calls: Sequence[str]
+    steps: Sequence[Move | Call]
+    unread: Sequence[Unread] = ()
+    task: str = ""
+
+    @cached_property
+    def moves(self) -> list[Move]:
+        """Its motions, in order."""
+        return [step for step in self.steps if isinstance(step, Move)]
+
+    @cached_property
+    def calls(self) -> list[str]:
+        """Names of the routines it calls, in order."""
+        return [step.name for step in self.steps if isinstance(step, Call)]
 
 
 @dataclass(frozen=True, eq=False)

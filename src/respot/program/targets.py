@@ -45,6 +45,8 @@ class Target:
         Span of the literal in the file.
     numbers : mapping of str to Number
         Field names of its language: ``X`` .. ``E6`` in KRL, ``x`` .. ``eax_f`` in RAPID.
+    fields : frozenset of str
+        Names of all fields that the literal has, numbers or not.
     pose : RigidTransform or None
         The pose in its base (``target2base``); None for joints and where a field is no number.
     unknown : str
@@ -60,6 +62,7 @@ class Target:
     column: int
     span: Span
     numbers: Mapping[str, Number] = field(default_factory=dict)
+    fields: frozenset[str] = frozenset()
     pose: RigidTransform | None = None
     unknown: str = ""
     declared: bool = True

@@ -7,6 +7,7 @@ import configparser
 from scipy.spatial.transform import RigidTransform
 
 from respot.geometry import pose, rotation_from_abc
+from respot.languages.krl.run_time import RunTime
 from respot.languages.krl.symbols import Aggregate, Scope, Symbol, Symbols, Value
 from respot.program.frames import Frame
 from respot.program.robot import Machine
@@ -48,10 +49,13 @@ class Frames:
     ----------
     symbols : Symbols
         Data of the robot.
+    run_time : RunTime
+        What its code changes.
     """
 
-    def __init__(self, symbols: Symbols) -> None:
+    def __init__(self, symbols: Symbols, run_time: RunTime) -> None:
         self._symbols = symbols
+        self._run_time = run_time
         self._frames: dict[tuple[str, int], Frame] = {}
 
     def tool(self, number: int) -> Frame:
@@ -64,7 +68,7 @@ class Frames:
 
     def declared(self, kind: str) -> list[Frame]:
         """Return all frames of ``"TOOL"`` or ``"BASE"`` that the robot's data hold."""
-        numbers = (number for number in range(1, 129) if self._symbols.find(f"{kind}_DATA[{number}]", "$CONFIG"))
+        numbers = (number for number in range(1, 129) if self._symbols.config(f"{kind}_DATA[{number}]"))
         return [self._frame(kind, number) for number in numbers]
 
     def _frame(self, kind: str, number: int) -> Frame:
@@ -77,21 +81,29 @@ class Frames:
         name = f"{kind}_DATA[{number}]"
         if number == 0:
             return Frame("$NULLFRAME" if kind == "TOOL" else "$WORLD", world=True)
-        symbol = self._symbols.find(name, "$CONFIG")
+        symbol = self._symbols.config(name)
         if symbol is None or not isinstance(symbol.value, Aggregate):
             return Frame(name, pose=None, unknown=f"{name} is not in the backup's $config.dat")
+        if self._run_time.writes_element(name):
+            return self._placed(symbol, None, "the program assigns to it")
+        if self._is_true(f"{kind}_CORR_ON"):
+            return self._placed(symbol, None, f"{kind}_CORR_ON corrects it while the robot runs")
         if kind == "BASE" and self._moves(number):
             return self._placed(symbol, None, "the base moves with an external axis")
         found = frame_pose(symbol.value)
         return self._placed(symbol, found, "" if found is not None else "not all of X Y Z A B C are numbers")
 
     def _placed(self, symbol: Symbol, found: RigidTransform | None, unknown: str) -> Frame:
-        label = self._symbols.find(symbol.name.replace("_DATA[", "_NAME[").replace("]", ",]"), "$CONFIG")
+        label = self._symbols.config(symbol.name.replace("_DATA[", "_NAME[").replace("]", ",]"))
         text = str(label.value).strip('" ') if label is not None and isinstance(label.value, str) else ""
         return Frame(symbol.name, text, found, unknown, symbol.path, symbol.line)
 
+    def _is_true(self, name: str) -> bool:
+        symbol = self._symbols.config(name)
+        return self._run_time.writes(name) or (symbol is not None and str(symbol.value).upper() == "TRUE")
+
     def _moves(self, number: int) -> bool:
-        symbol = self._symbols.find(f"MACHINE_FRAME_DAT[{number}]", "$CONFIG")
+        symbol = self._symbols.config(f"MACHINE_FRAME_DAT[{number}]")
         if symbol is None or not isinstance(symbol.value, Aggregate):
             return False
         return (symbol.value.number("MACH_DEF_INDEX") or 0) > 0

@@ -138,28 +138,50 @@ def _assigned(path: str, statement: Statement, everywhere: bool) -> Iterator[Sym
         yield Symbol(name, "", value_of(expression), path, statement.line, everywhere)
 
 
+def module_key(path: str) -> str:
+    """Key of the module that a file belongs to: a ``.src`` and the ``.dat`` beside it."""
+    return path.rpartition(".")[0].upper()
+
+
+def is_own(path: str) -> bool:
+    """Whether a file lies in the folder of the robot itself, not in a copy or in the controller's (``STEU``)."""
+    return "/r1/" in f"/{path.lower()}"
+
+
 class Symbols:
     """All data of one robot.
+
+    Two global data of one name cannot both be loaded: where the robot's own folder does not decide, the name is
+    ambiguous and has no value.
 
     Parameters
     ----------
     scopes : iterable of Scope
-        One for each data list.
+        One for each data list, by the path of its file without suffix; those of the robot's own folder come first.
     """
 
     def __init__(self, scopes: Iterable[Scope]) -> None:
         self.scopes: dict[str, Scope] = {}
         self._global: dict[str, Symbol] = {}
         for scope in scopes:
-            self.scopes[scope.module.upper()] = scope
+            self.scopes.setdefault(scope.module, scope)
             for key, symbol in scope.symbols.items():
                 if symbol.visible:
-                    self._global.setdefault(key, symbol)
+                    self._add_global(key, symbol)
+
+    def _add_global(self, key: str, symbol: Symbol) -> None:
+        other = self._global.setdefault(key, symbol)
+        if other is not symbol and is_own(other.path) == is_own(symbol.path):
+            self._global[key] = Symbol(other.name, "AMBIGUOUS", None, other.path, other.line, visible=True)
 
     def find(self, name: str, module: str) -> Symbol | None:
         """Symbol that ``name`` means in a module, or None."""
         key = "".join(name.split()).upper()
-        own = self.scopes.get(module.upper())
+        own = self.scopes.get(module)
         if own is not None and key in own.symbols:
             return own.symbols[key]
         return self._global.get(key)
+
+    def config(self, name: str) -> Symbol | None:
+        """Symbol of ``$config.dat``, or None."""
+        return self._global.get(name.upper())

@@ -38,6 +38,7 @@ class Targets(TargetTable):
                 column=column,
                 span=aggregate.span,
                 numbers=aggregate.numbers(),
+                fields=frozenset(aggregate.members),
                 pose=found,
                 unknown="" if found is not None or kind is TargetKind.JOINTS else "not all of X Y Z A B C are numbers",
                 declared=declared,
@@ -46,6 +47,6 @@ class Targets(TargetTable):
 
 
 def _kind(aggregate: Aggregate) -> TargetKind | None:
-    if "X" in aggregate.members or "Y" in aggregate.members or "Z" in aggregate.members:
+    if not aggregate.members.keys().isdisjoint("XYZABC"):
         return TargetKind.POSE
     return TargetKind.JOINTS if "A1" in aggregate.members else None

@@ -25,7 +25,7 @@ def pose_values(target: Target, pose: RigidTransform) -> dict[str, float]:
 
 def has_configuration(target: Target) -> bool:
     """Whether the target carries status and turn."""
-    return "S" in target.numbers or "T" in target.numbers
+    return "S" in target.fields or "T" in target.fields
 
 
 def header_place(file: ProgramFile) -> Span | None:

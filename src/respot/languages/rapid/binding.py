@@ -7,19 +7,19 @@ their own, and the order of gun and spot data differs between generations (facts
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from respot.languages.literals import number_of
 from respot.languages.rapid import machine
 from respot.languages.rapid.blocks import Routine as Block
 from respot.languages.rapid.forms import FORMS
+from respot.languages.rapid.run_time import RunTime, called, name_of
 from respot.languages.rapid.symbols import Aggregate, Module, Symbol, Task, routine_symbols, value_of
 from respot.languages.rapid.targets import Targets
 from respot.program.frames import Frame
 from respot.program.moves import BaseOffset, Motion, Move
-from respot.program.robot import Routine
-from respot.program.statement import Node, Statement
+from respot.program.robot import Call, Routine, Unread
+from respot.program.statement import OPAQUE, Node, Statement
 from respot.program.targets import Target, TargetKind
 
 #: Instructions of RobotWare that move to their first positions (facts: rapid.md 1.5).
@@ -38,6 +38,7 @@ class _Operand:
     target: Target | None
     unknown: str = ""
     offset: BaseOffset | None = None
+    parameter: bool = False
 
 
 class Binder:
@@ -45,60 +46,76 @@ class Binder:
 
     Parameters
     ----------
+    name : str
+        The task.
     task : Task
         Names of the task.
     targets : Targets
         Literal positions of the robot.
-    written : set of str
-        Names, in lower case, that code of the task assigns to.
-    displaced : str
-        Why every position of the task is displaced while the robot runs; empty if none is.
+    run_time : RunTime
+        What its code changes.
     """
 
-    def __init__(self, task: Task, targets: Targets, written: set[str], displaced: str) -> None:
+    def __init__(self, name: str, task: Task, targets: Targets, run_time: RunTime) -> None:
+        self._name = name
         self._task = task
         self._targets = targets
-        self._written = written
-        self._displaced = displaced
-        self._frames: dict[int, Frame] = {}
+        self._run_time = run_time
+        self._frames: dict[tuple[str, int, str], Frame] = {}
 
     def routine(self, block: Block, module: Module) -> Routine:
         """Motions and calls of a routine."""
         local = routine_symbols(module.path, block)
-        moves: list[Move] = []
-        calls: list[str] = []
+        steps: list[Move | Call] = []
+        unread: list[Unread] = []
         for statement in block.body:
-            for call in _calls(statement):
-                name, found = self._bind(call, statement, block, module, local)
-                moves += found
-                if found and found[0].base is None and self._task.has_routine(name, module):
-                    calls.append(name)
-                elif found:
-                    continue
-                elif FORMS.welds(name, []) and moves:
-                    moves[-1] = replace(moves[-1], weld=True)
-                elif name:
-                    calls.append(name)
-        return Routine(block.name, module.name, module.path, block.head.line, tuple(moves), tuple(calls))
+            if statement.kind == OPAQUE:
+                unread.append(Unread(statement.line, statement.source[:200], statement.shape.reason))
+            elif statement.kind == "connect":
+                steps.append(Call(statement.node.all("name")[-1].text, statement.line))
+            for call in called(statement):
+                self._follow(steps, call, statement, block, module, local)
+        line = block.head.line
+        return Routine(block.name, module.name, module.path, line, tuple(steps), tuple(unread), self._name)
+
+    def _follow(
+        self,
+        steps: list[Move | Call],
+        call: Node,
+        statement: Statement,
+        block: Block,
+        module: Module,
+        local: dict[str, Symbol],
+    ) -> None:
+        name = name_of(call)
+        found = self._bind(call, statement, block, module, local) if call.kind == "call" else []
+        steps += found
+        if self._task.has_routine(name, module):
+            steps.append(Call(name, statement.line))
+        if not found and FORMS.welds(name, []):
+            for index in range(len(steps) - 1, -1, -1):
+                step = steps[index]
+                if isinstance(step, Move):
+                    steps[index] = replace(step, weld=True)
+                    return
 
     def frame(self, symbol: Symbol) -> Frame:
         """Tool or work object of a datum; one `Frame` for each datum."""
-        key = id(symbol)
+        key = (symbol.path, symbol.line, symbol.name.lower())
         if key not in self._frames:
             read = machine.read_tool if symbol.type == "tooldata" else machine.read_work_object
             frame = read(symbol)
             if symbol.storage == "parameter":
                 frame = Frame(symbol.name, pose=None, unknown="it is a parameter of the routine")
-            elif symbol.storage != "CONST" and symbol.name.lower() in self._written:
+            elif symbol.storage != "CONST" and symbol.name.lower() in self._run_time.written:
                 frame = replace(frame, pose=None, unknown="it is assigned to while the robot runs")
             self._frames[key] = frame
         return self._frames[key]
 
     def _bind(
         self, call: Node, statement: Statement, block: Block, module: Module, local: dict[str, Symbol]
-    ) -> tuple[str, list[Move]]:
-        names = call.tokens("NAME")
-        name = names[0].text if names else ""
+    ) -> list[Move]:
+        name = name_of(call)
         arguments = call.first("arguments")
         positional = [] if arguments is None else [node.nodes[0] for node in arguments.all("argument") if node.nodes]
         symbols = [self._symbol(node, module, local) for node in positional]
@@ -108,7 +125,9 @@ class Binder:
         handed = False
         instruction = _INSTRUCTION.fullmatch(name) is not None and not self._task.has_routine(name, module)
         if not operands and not instruction:
-            return name, []
+            return []
+        if self._hands_through(arguments, operands, tool, module, local):
+            return []
         if not operands:
             operands = [_Operand(None, f"{call.text} goes to a position that is computed while the robot runs")]
         elif tool is None and not flange and not instruction:
@@ -129,12 +148,34 @@ class Binder:
             base=None if handed else self._work_object(arguments, module, local),
             weld=bool(spot_data) or bool(FORMS.weld_instructions and FORMS.weld_instructions.match(name)),
         )
-        moves = [self._move(first, operand, spot_data) for operand in operands]
-        return name, moves
+        return [self._move(first, operand, spot_data) for operand in operands]
+
+    def _hands_through(
+        self,
+        arguments: Node | None,
+        operands: list[_Operand],
+        tool: Symbol | None,
+        module: Module,
+        local: dict[str, Symbol],
+    ) -> bool:
+        """Whether a motion within a wrapper goes to the wrapper's own parameters and nothing else.
+
+        Such a motion is judged where the wrapper is called.
+        """
+        if not operands or not all(operand.parameter for operand in operands) or arguments is None:
+            return False
+        if tool is None or tool.storage != "parameter":
+            return False
+        for option in arguments.all("optional_argument", "conditional_argument"):
+            if option.tokens("NAME")[0].text.lower() == "wobj":
+                given = option.nodes[0].text if option.nodes else option.tokens("NAME")[-1].text
+                symbol = self._task.find(given, module, local)
+                return symbol is not None and symbol.storage == "parameter"
+        return False
 
     def _move(self, move: Move, operand: _Operand, spot_data: list[str]) -> Move:
-        external = move.tool is not None and move.base is not None and not move.tool.held and move.base.held
-        unknown = operand.unknown or self._displaced
+        external = move.base is not None and move.base.held
+        unknown = operand.unknown or self._run_time.displaced
         if move.tool is not None and move.base is not None and move.tool.held == move.base.held and not unknown:
             unknown = f"{move.tool} and {move.base} are both held by the robot, or neither is"
         move = replace(move, target=operand.target, offset=operand.offset, unknown=unknown, external_tcp=external)
@@ -185,7 +226,8 @@ class Binder:
         is_target = symbol.type in ("robtarget", "jointtarget")
         if not targets:
             reason = "is a parameter of the routine" if symbol.storage == "parameter" else "has no literal position"
-            return _Operand(None, f"{symbol.name} {reason}") if is_target else None
+            bare = symbol.storage == "parameter" and not node.all("index", "component")
+            return _Operand(None, f"{symbol.name} {reason}", parameter=bare) if is_target else None
         if node.all("component"):
             return None
         numbers = [number_of(child) for index in node.all("index") for child in index.nodes]
@@ -195,9 +237,12 @@ class Binder:
         target = targets.get(key)
         if target is None:
             return _Operand(None, f"{node.text} has no literal position") if is_target else None
-        written = symbol.storage != "CONST" and symbol.name.lower() in self._written
-        if written and target.kind is TargetKind.POSE:
-            return _Operand(target, f"{symbol.name} is assigned to while the robot runs")
+        key_name = symbol.name.lower()
+        if target.kind is TargetKind.POSE and symbol.storage != "CONST":
+            if key_name in self._run_time.written:
+                return _Operand(target, f"{symbol.name} is assigned to while the robot runs")
+            if symbol.storage == "PERS" and not symbol.local and key_name in self._run_time.twins:
+                return _Operand(target, f"{symbol.name} is persistent data of several tasks: each holds a copy")
         return _Operand(target)
 
     def _function(
@@ -223,13 +268,6 @@ class Binder:
         literal = all(number is not None for number in numbers)
         offset = BaseOffset((numbers[0], numbers[1], numbers[2]), span, module.path, statement.line, literal)
         return replace(inner, offset=offset)
-
-
-def _calls(statement: Statement) -> Iterator[Node]:
-    if statement.kind == "call":
-        yield statement.node
-    elif statement.kind == "compact_if":
-        yield from statement.node.all("call")
 
 
 def _motion(name: str) -> Motion:

@@ -8,11 +8,11 @@ laid into the tree afterwards, as the grammar would have built them (a test hold
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 
 from respot.languages.shapes import MOST_SHAPES, Part, Shapes, Splitter, Unit
-from respot.program.statement import OPAQUE, Branch, Leaf, Numbers, Shape
+from respot.program.statement import OPAQUE, Branch, Leaf, Lexicon, Numbers, Shape
 from respot.source import Span
 
 _LITERALS = {"0": ("number", "NUMBER"), '"': ("string", "STRING"), "TRUE": ("boolean", "BOOLEAN")}
@@ -23,8 +23,8 @@ _LARGE = 200
 #: Tokens of a statement whose shape is worth keeping: none of a longer table is met again.
 _LARGEST_KEPT = 20_000
 #: Tokens of a statement for which a pattern with a group for each is made, and how often it must be met for it.
-_MOST_GROUPS = 500
-_RARE = 3
+_MOST_GROUPS = 200
+_RARE = 60
 #: Deeper ones are left to the grammar, which refuses them.
 _DEEPEST = 50
 
@@ -63,15 +63,13 @@ class Unsigned:
     ----------
     shape : LaidShape
         Any of them.
-    taken : list of Span
-        Its aggregates of literals.
     """
 
-    def __init__(self, shape: LaidShape, taken: list[Span]) -> None:
+    def __init__(self, shape: LaidShape) -> None:
         self.used = 0
         self._shape = shape
         self._literal = [False] * len(shape.kinds)
-        for first, last in taken:
+        for first, last in shape.taken:
             self._literal[first : last + 1] = [True] * (last + 1 - first)
 
     @cached_property
@@ -86,7 +84,7 @@ class Unsigned:
         """One group for each number with its sign."""
         lexicon = self._shape.lexicon
         pieces = [lexicon.pattern_of(kind) for kind in self._shape.kinds]
-        for first, last in self._shape.number_places():
+        for first, last in self._shape.number_places:
             if not self._literal[last]:
                 pieces[first] = f"({pieces[first]}"
                 pieces[last] = f"{pieces[last]})"
@@ -104,13 +102,31 @@ class Unsigned:
 
 
 class LaidShape(Shape):
-    """A shape whose literals did not pass the grammar."""
+    """A shape whose literals did not pass the grammar.
 
-    unsigned: Unsigned | None = None
+    Parameters
+    ----------
+    tree : Branch
+        Its tree, with `Rows` where the literals are.
+    taken : list of Span
+        First and last tokens of the literals.
+    """
 
+    def __init__(self, tree: Branch, lexicon: Lexicon, kinds: tuple[str, ...], taken: list[Span]) -> None:
+        super().__init__(tree.kind, tree, "", lexicon, kinds)
+        self.taken = taken
+        #: None for a statement too large for patterns.
+        self.unsigned: Unsigned | None = None
+
+    @cached_property
     def number_places(self) -> list[Span]:
         """First and last token of every number with its sign."""
-        return [(first, last) for _, first, last in self._places.numbers]
+        kinds = self.kinds
+        places = [] if self.tree is None else list(_outside(self.tree))
+        for first, last in self.taken:
+            found = (position for position in range(first, last) if kinds[position] == "0")
+            places += ((position - (kinds[position - 1] in _SIGNS), position) for position in found)
+        return sorted(places)
 
     def spans(self, text: str, start: int, end: int) -> list[Span]:
         """Spans of the tokens of a statement of this shape."""
@@ -120,17 +136,21 @@ class LaidShape(Shape):
             found = [] if match is None else [span for span in match.regs[1:] if span[0] >= 0]
             if len(found) == len(self.kinds):
                 return found
-        tokens = self.lexicon.token.finditer(text, start, end)
-        return [match.span() for match in tokens if match.lastindex is None]
+        return self._found(text, start, end)
 
     def numbers(self, text: str, start: int, end: int) -> Numbers:
         """Numbers of a statement of this shape."""
         unsigned = self._often()
-        if unsigned is not None:
-            match = unsigned.numbers.match(text, start, end)
-            if match is not None:
-                return Numbers(("",) * len(match.groups()), match.groups(), match.regs[1:])
-        return super().numbers(text, start, end)
+        match = None if unsigned is None else unsigned.numbers.match(text, start, end)
+        if match is not None:
+            return Numbers(("",) * len(match.groups()), match.groups(), match.regs[1:])
+        tokens = self._found(text, start, end)
+        spans = tuple((tokens[first][0], tokens[last][1]) for first, last in self.number_places)
+        return Numbers(("",) * len(spans), tuple(text[first:last] for first, last in spans), spans)
+
+    def _found(self, text: str, start: int, end: int) -> list[Span]:
+        tokens = self.lexicon.token.finditer(text, start, end)
+        return [match.span() for match in tokens if match.lastindex is None]
 
     def _often(self) -> Unsigned | None:
         """Return the common patterns if they are worth making."""
@@ -138,6 +158,21 @@ class LaidShape(Shape):
             return None
         self.unsigned.used += 1
         return self.unsigned if self.unsigned.used > _RARE else None
+
+
+def _outside(branch: Branch) -> Iterator[Span]:
+    """First and last tokens of the numbers of a tree that are in no literal aggregate."""
+    if isinstance(branch, Rows):
+        return
+    inner = branch
+    while inner.kind == "signed" and isinstance(inner.children[-1], Branch):
+        inner = inner.children[-1]
+    if inner.kind == "number":
+        yield branch.first, branch.last
+        return
+    for child in branch.children:
+        if isinstance(child, Branch):
+            yield from _outside(child)
 
 
 class RapidShapes(Shapes):
@@ -206,22 +241,22 @@ class RapidShapes(Shapes):
             fault = None if short.fault is None else kept[short.fault]
             return Shape(OPAQUE, None, short.reason, short.lexicon, kinds, fault)
         tree = _lay(short.tree, kept, dict(taken), kinds)
-        shape = LaidShape(tree.kind, tree, "", short.lexicon, kinds)
+        shape = LaidShape(tree, short.lexicon, kinds, taken)
         if len(kinds) <= _MOST_GROUPS:
-            shape.unsigned = self._unsigned_of(shape, taken)
+            shape.unsigned = self._unsigned_of(shape)
         return shape
 
-    def _unsigned_of(self, shape: LaidShape, taken: list[Span]) -> Unsigned:
+    def _unsigned_of(self, shape: LaidShape) -> Unsigned:
         key: list[str] = []
         at = 0
-        for first, last in taken:
+        for first, last in shape.taken:
             key += shape.kinds[at:first]
             key += (kind for kind in shape.kinds[first : last + 1] if kind not in _SIGNS)
             at = last + 1
         key += shape.kinds[at:]
         if len(self._unsigned) >= MOST_SHAPES:
             self._unsigned.clear()
-        return self._unsigned.setdefault(tuple(key), Unsigned(shape, taken))
+        return self._unsigned.setdefault(tuple(key), Unsigned(shape))
 
     def _without(self, text: str, first: int, kept: list[int]) -> Shape:
         """Shape of a statement of which only some tokens are kept."""

@@ -8,19 +8,17 @@ from pathlib import PurePosixPath
 from respot.issues import Issue
 from respot.languages.rapid import blocks, machine
 from respot.languages.rapid.binding import Binder
-from respot.languages.rapid.symbols import Module, Task, read_module
+from respot.languages.rapid.recognition import recognise
+from respot.languages.rapid.run_time import read_run_time
+from respot.languages.rapid.symbols import Task, read_module
 from respot.languages.rapid.syntax import ENCODINGS, read_statements
 from respot.languages.rapid.targets import Targets
 from respot.languages.reading import opaque_issues
 from respot.program.frames import Frame
 from respot.program.robot import ProgramFile, Robot, Routine
-from respot.program.statement import Statement
 from respot.source import SourceText
 
 SUFFIXES = (".mod", ".sys", ".modx", ".sysx", ".prg")
-#: First bytes of modules that RobotWare encodes (facts: rapid.md 4.2).
-_ENCODED = (b"\xfc", b"\xfd", b"\xfe")
-_DISPLACING = ("pdispset", "pdispon")
 
 
 def read_robot(name: str, root: str, files: Mapping[str, bytes]) -> Robot:
@@ -41,12 +39,20 @@ def read_robot(name: str, root: str, files: Mapping[str, bytes]) -> Robot:
     for path, data in files.items():
         if not path.lower().endswith(SUFFIXES) or "/home/" in f"/{path.lower()}":
             continue
-        if data.startswith(_ENCODED) and b"MODULE" not in data.upper():
+        kind = recognise(data)
+        if kind == "other":
+            issues.append(Issue("NOT_A_PROGRAM", "is no RAPID module; it is copied as it is", path))
+            continue
+        if kind == "binary":
             issues.append(Issue("BINARY_MODULE", "an encoded module; it is copied as it is", path))
             continue
         source = SourceText(path, data, ENCODINGS)
         statements = read_statements(source.text, source.line_starts)
         layouts[path] = blocks.layout(statements)
+        if len(layouts[path].modules) > 1:
+            message = "holds more than one MODULE, as no controller saves it; it is copied as it is: split it"
+            issues.append(Issue("SEVERAL_MODULES", message, path, layouts[path].modules[1].line))
+            continue
         program = layouts[path].name or PurePosixPath(path).stem
         read[path] = ProgramFile(source, program, statements)
         issues += opaque_issues(read[path])
@@ -55,12 +61,19 @@ def read_robot(name: str, root: str, files: Mapping[str, bytes]) -> Robot:
     routines: list[Routine] = []
     tools: list[Frame] = []
     bases: list[Frame] = []
-    for paths in _tasks(read).values():
-        modules = [read_module(path, read[path].program, layouts[path]) for path in paths]
-        found, frames = _read_task(modules, {path: read[path] for path in paths}, targets)
-        routines += found
-        tools += frames["tooldata"]
-        bases += frames["wobjdata"]
+    tasks = {
+        task: [read_module(path, read[path].program, layouts[path]) for path in paths]
+        for task, paths in _tasks(read).items()
+    }
+    run_times = read_run_time(tasks)
+    for task, modules in tasks.items():
+        binder = Binder(task, Task(modules), targets, run_times[task])
+        for module in modules:
+            for symbol in module.symbols.values():
+                targets.declared(symbol)
+                if symbol.type in ("tooldata", "wobjdata") and symbol.value is not None:
+                    (tools if symbol.type == "tooldata" else bases).append(binder.frame(symbol))
+        routines += [binder.routine(block, module) for module in modules for block in module.routines.values()]
     return Robot(
         name=machine.system_name(files) or name,
         language="rapid",
@@ -83,39 +96,3 @@ def _tasks(read: Mapping[str, ProgramFile]) -> dict[str, list[str]]:
         task = next((part for part in parts if part.startswith("TASK") and part[4:].isdigit()), "")
         tasks.setdefault(task, []).append(path)
     return tasks
-
-
-def _read_task(
-    modules: list[Module], read: Mapping[str, ProgramFile], targets: Targets
-) -> tuple[list[Routine], dict[str, list[Frame]]]:
-    task = Task(modules)
-    statements = [(path, statement) for path, file in read.items() for statement in file.statements]
-    binder = Binder(task, targets, _written(statements), _displaced(statements))
-    frames: dict[str, list[Frame]] = {"tooldata": [], "wobjdata": []}
-    for module in modules:
-        for symbol in module.symbols.values():
-            targets.declared(symbol)
-            if symbol.type in frames and symbol.value is not None:
-                frames[symbol.type].append(binder.frame(symbol))
-    routines = [binder.routine(block, module) for module in modules for block in module.routines.values()]
-    return routines, frames
-
-
-def _written(statements: list[tuple[str, Statement]]) -> set[str]:
-    """Names that code assigns to, whole or in part."""
-    assignments = (
-        node
-        for _, statement in statements
-        if statement.kind in ("assignment", "compact_if")
-        for node in ([statement.node] if statement.kind == "assignment" else statement.node.all("assignment"))
-    )
-    return {node.nodes[0].nodes[0].text.lower() for node in assignments}
-
-
-def _displaced(statements: list[tuple[str, Statement]]) -> str:
-    for path, statement in statements:
-        if statement.kind == "call":
-            names = statement.node.tokens("NAME")
-            if names and names[0].text.lower() in _DISPLACING:
-                return f"{names[0].text} at {path}:{statement.line} displaces the positions of this task"
-    return ""

@@ -240,7 +240,7 @@ class _Reader:
         text, add, known = self._text, self._statements.append, _LINES
         ends = [*self._line_starts[1:], len(text)]
         number = 0
-        for start, end, key in zip(self._line_starts, ends, SHAPES.keys(text), strict=False):
+        for start, end, key in zip(self._line_starts, ends, SHAPES.keys(text, self._line_starts), strict=False):
             number += 1
             if self._begun is None and not self._finished:
                 try:

@@ -69,6 +69,7 @@ class Targets(TargetTable):
                 column=column,
                 span=aggregate.span,
                 numbers=numbers,
+                fields=frozenset(field for group in groups for field in group),
                 pose=pose(floats[:3], rotation_from_quaternion(floats[3:])) if known else None,
                 unknown=unknown,
                 declared=declared,

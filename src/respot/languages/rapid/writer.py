@@ -29,7 +29,7 @@ def pose_values(target: Target, pose: RigidTransform) -> dict[str, float]:
 
 def has_configuration(target: Target) -> bool:
     """Whether the target carries confdata; a robtarget always does."""
-    return "cf1" in target.numbers
+    return "cf1" in target.fields
 
 
 def header_place(file: ProgramFile) -> Span | None:
