@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from itertools import pairwise
 
 import numpy as np
@@ -20,9 +21,11 @@ from respot.issues import BadInputError, Issue
 from respot.languages import LANGUAGES, Language
 from respot.languages.writing import Header, applied_calibrations, templates
 from respot.program.moves import Move
-from respot.program.robot import Robot
+from respot.program.robot import Robot, Routine
 from respot.source import Edit, splice
 
+#: Calls within calls that transitions are followed through.
+_DEEPEST_CALL = 8
 #: What `--keep-config` may override: not a pose that the robot cannot reach.
 _KEPT = frozenset(("CONFIG_NOT_CHECKED", "CONFIG_INCONSISTENT", "UNKNOWN_TOOL"))
 
@@ -118,6 +121,7 @@ def align(
     """
     language = LANGUAGES[robot.language]
     _refuse_twice(robot, calibration_hash)
+    _check_options(robot, options)
     scope = find_scope(robot, language, spot_moves, options.programs)
     after = {id(moving): new_pose(moving, source2reference) for moving in scope.moving}
     moving = [item for item in scope.moving if _moves(item, after[id(item)])]
@@ -136,7 +140,7 @@ def align(
         edits=edits,
         refused=refused,
         refused_programs=refused_programs,
-        transitions=_transitions(scope, {id(item.target) for item in moving}, refused_programs),
+        transitions=_transitions(robot, scope, {id(item.target) for item in moving}, refused_programs),
         files=_changed_files(robot, language, options, edits, header),
         reconfigured=all(id(item) in configured for item in moving if language.has_configuration(item.target)),
         issues=_issues(robot, scope, moving, spot_moves, edits),
@@ -160,7 +164,8 @@ class _Kept:
 
     def __call__(self, programs: Collection[str], target: str) -> bool:
         if self._partial:
-            return any((program, target) in self._targets for program in programs)
+            relative = target == str(None) and any(program in programs for program, _ in self._targets)
+            return relative or any((program, target) in self._targets for program in programs)
         return any(program in self._programs for program in programs)
 
 
@@ -169,6 +174,15 @@ def _refuse_twice(robot: Robot, calibration_hash: str) -> None:
         if calibration_hash in applied_calibrations(file.source):
             message = "this calibration was applied to this file before: start from the original backup"
             raise BadInputError("ALREADY_APPLIED", message, path)
+
+
+def _check_options(robot: Robot, options: CorrectionOptions) -> None:
+    if options.templates is not None and not options.templates.is_dir():
+        raise BadInputError("BAD_OPTION", "--templates is no folder", str(options.templates))
+    wanted = options.programs
+    if wanted is not None and not any(fnmatchcase(name.lower(), wanted.lower()) for name in robot.programs):
+        known = ", ".join(robot.programs[:10])
+        raise BadInputError("BAD_OPTION", f"--programs {wanted} fits no program; there are {known}")
 
 
 def _moves(moving: Moving, after: RigidTransform) -> bool:
@@ -265,24 +279,40 @@ def _changed_files(
         file = robot.files[path]
         place = language.header_place(file)
         if place is not None:
-            said = Header(__version__, header.direction, header.kind, file.source.sha256, header.calibration_hash)
+            earlier = tuple(sorted(applied_calibrations(file.source)))
+            said = Header(
+                __version__, header.direction, header.kind, file.source.sha256, header.calibration_hash, earlier
+            )
             changes = [*changes, Edit(place, made.header(said, file.source.newline), "header")]
         files[path] = file.source.encode(splice(file.source.text, changes))
     return files
 
 
-def _transitions(scope: Scope, moved: set[int], refused_programs: frozenset[str]) -> list[Transition]:
-    found = []
+def _transitions(robot: Robot, scope: Scope, moved: set[int], refused_programs: frozenset[str]) -> list[Transition]:
+    """Motions between moved and unmoved targets, in the order in which routines in scope call each other."""
+    calls: dict[tuple[str, str], Routine] = {}
+    for routine in robot.routines:
+        calls.setdefault((routine.task, routine.name.lower()), routine)
+    found: dict[tuple[str, str, str, int], Transition] = {}
     for routine in scope.routines:
-        if routine.program in refused_programs:
-            continue
-        moves = [move for move in routine.moves if move.target is not None]
+        moves = [move for move in _path(routine, calls, ()) if move.target is not None]
         for first, second in pairwise(moves):
-            if (id(first.target) in moved) != (id(second.target) in moved):
-                found.append(
-                    Transition(str(first.target), str(second.target), routine.program, second.path, second.line)
-                )
-    return found
+            shifted = [id(m.target) in moved and m.program not in refused_programs for m in (first, second)]
+            if shifted[0] != shifted[1]:
+                item = Transition(str(first.target), str(second.target), second.program, second.path, second.line)
+                found.setdefault((item.start, item.end, item.path, item.line), item)
+    return list(found.values())
+
+
+def _path(routine: Routine, calls: Mapping[tuple[str, str], Routine], above: tuple[int, ...]) -> Iterator[Move]:
+    """Motions of a routine and of what it calls, in order; a routine that calls itself is followed once."""
+    for step in routine.steps:
+        if isinstance(step, Move):
+            yield step
+        else:
+            called = calls.get((routine.task, step.name.lower()))
+            if called is not None and id(called) not in above and len(above) < _DEEPEST_CALL:
+                yield from _path(called, calls, (*above, id(routine)))
 
 
 def _issues(

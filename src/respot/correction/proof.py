@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 
 from respot.correction.correction import Correction
 from respot.correction.points import PointEdit
-from respot.languages.writing import header_span
+from respot.languages import Language
 from respot.program.robot import ProgramFile, Robot
 from respot.program.targets import Number
 from respot.source import SourceText, Span
@@ -46,7 +46,7 @@ def prove(correction: Correction, old: Mapping[str, bytes], new: Mapping[str, by
     for path in correction.files:
         before, after = literals_before.get(path, []), literals_after.get(path, [])
         edits = {edit.edit.span: edit for edit in correction.edits if edit.path == path}
-        _compare(path, correction.robot.files[path], robot.files[path], before, after, edits)
+        _compare(path, correction.language, correction.robot.files[path], robot.files[path], before, after, edits)
 
 
 #: Span of a literal and its numbers by field.
@@ -68,6 +68,7 @@ def _literals(robot: Robot) -> dict[str, list[_Literal]]:
 
 def _compare(
     path: str,
+    language: Language,
     old: ProgramFile,
     new: ProgramFile,
     before: Sequence[_Literal],
@@ -76,7 +77,7 @@ def _compare(
 ) -> None:
     if len(before) != len(after):
         raise VerifyError(f"{path}: has {len(after)} positions where it had {len(before)}")
-    old_cuts, new_cuts = _header(old), _header(new)
+    old_cuts, new_cuts = _header(old, language), _header(new, language)
     for (old_span, old_numbers), (new_span, new_numbers) in zip(before, after, strict=True):
         edit = edits.get(old_span)
         if edit is None:
@@ -102,13 +103,10 @@ def _check_values(path: str, source: SourceText, edit: PointEdit, numbers: Mappi
             raise VerifyError(f"{path}: {edit.target} has {name} {number.value}, {value:.9f} was intended")
 
 
-def _header(file: ProgramFile) -> list[Span]:
-    """Span of our header below the first head line, if any."""
-    head = next((s for s in file.statements if s.kind in ("routine", "function", "data_list", "module")), None)
-    if head is None:
-        return []
-    start, end = header_span(file.source, file.source.place(head.end)[0])
-    return [(start, end)] if end > start else []
+def _header(file: ProgramFile, language: Language) -> list[Span]:
+    """Span of our header, if any."""
+    place = language.header_place(file)
+    return [place] if place is not None and place[1] > place[0] else []
 
 
 def _added(source: SourceText, literal: Span, numbers: Sequence[Number]) -> list[Span]:

@@ -4,7 +4,7 @@ In scope are the routines that hold a matched spot, what they call, and what cal
 caller belongs to the part as much as the spot. A target moves if a routine in scope goes to it under a base that a
 matched spot uses. Targets there under other bases (tip dresser, racks) stay. Under the world frame a routine must be
 known as a service routine by its name, or only call the others, since the program does not tell whether the target
-belongs to the part.
+belongs to the part. Every other routine that goes to a moved target comes into scope with it.
 """
 
 from __future__ import annotations
@@ -13,11 +13,13 @@ import fnmatch
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from respot.geometry import distance_mm, turn_deg
 from respot.languages import Language
 from respot.program.frames import Frame
 from respot.program.moves import Move
 from respot.program.robot import Robot, Routine
 from respot.program.targets import Target, TargetKind
+from respot.tolerance import SAME_POSITION_MM, SAME_ROTATION_DEG
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,56 +96,170 @@ def find_scope(robot: Robot, language: Language, spot_moves: Iterable[Move], pro
         Glob of programs to take in place of the routines with matched spots.
     """
     spots = list(spot_moves)
-    routines, core = _routines(robot, spots, programs)
-    scope = Scope(routines=routines)
-    bases = {id(move.base) for move in spots}
-    uses: dict[int, list[Move]] = {}
-    for routine in routines:
-        for move in routine.moves:
-            refusal = _refusal(move, bases, language, calls_only=id(routine) not in core)
-            if refusal is not None:
+    return _Finder(robot, language, spots, programs).find()
+
+
+class _Finder:
+    """Decides, and takes in every routine that shares a target with those in scope."""
+
+    def __init__(self, robot: Robot, language: Language, spots: Sequence[Move], programs: str | None) -> None:
+        self._robot = robot
+        self._language = language
+        held = {id(move) for move in spots}
+        self._task_of = {id(move): routine.task for routine in robot.routines for move in routine.moves}
+        self._bases = [(self._task_of[id(move)], move.base) for move in spots if move.base is not None]
+        self._welding = {id(r) for r in robot.routines if any(id(move) in held for move in r.moves)}
+        self._core, self._wide = _routines(robot, self._welding, programs)
+        self._everywhere: dict[int, list[Move]] = {}
+        for move in robot.moves():
+            if move.target is not None:
+                self._everywhere.setdefault(id(move.target), []).append(move)
+        self._found: dict[tuple[str, int], bool] = {}
+
+    def find(self) -> Scope:
+        """Return the decision."""
+        routine_of = {id(move): routine for routine in self._robot.routines for move in routine.moves}
+        while True:
+            scope, uses = self._decide_moves()
+            sharing = {
+                id(routine_of[id(move)]) for target in uses for move in self._everywhere[target]
+            } - self._core - self._wide  # fmt: skip
+            if not sharing:
+                break
+            self._wide |= sharing
+        for target in self._robot.targets:
+            self._decide_target(scope, target, uses.get(id(target), []))
+        return scope
+
+    def _decide_moves(self) -> tuple[Scope, dict[int, list[Move]]]:
+        scope = Scope(routines=[r for r in self._robot.routines if id(r) in self._core | self._wide])
+        uses: dict[int, list[Move]] = {}
+        for routine in scope.routines:
+            for unread in routine.unread if id(routine) in self._core else ():
+                message = f"nobody knows what {unread.text.strip()!r} does: {unread.reason}"
+                name = f"line {unread.line}"
+                refusal = Refusal(routine.program, name, "OPAQUE_STATEMENT", message, routine.path, unread.line)
                 scope.refusals.append(refusal)
-            elif _is_moving(move, bases, language):
-                if move.target is not None:
-                    uses.setdefault(id(move.target), []).append(move)
-                if move.offset is not None:
-                    scope.offsets.append(move)
-    everywhere: dict[int, list[Move]] = {}
-    for move in robot.moves():
-        if move.target is not None:
-            everywhere.setdefault(id(move.target), []).append(move)
-    for target in robot.targets:
-        _decide(scope, target, uses.get(id(target), []), everywhere.get(id(target), []), bases)
-    return scope
+            for move in routine.moves:
+                refused = self._refusal(move, routine)
+                if refused is not None:
+                    scope.refusals.append(refused)
+                elif self._moves(move, routine):
+                    if move.target is not None:
+                        uses.setdefault(id(move.target), []).append(move)
+                    if move.offset is not None:
+                        scope.offsets.append(move)
+        return scope, uses
+
+    def _is_service(self, routine: Routine) -> bool:
+        return id(routine) not in self._welding and self._language.forms.is_service(routine.name)
+
+    def _moves(self, move: Move, routine: Routine) -> bool:
+        if move.target is not None and move.target.kind is TargetKind.JOINTS:
+            return False
+        if move.base is None or not self._is_matched(move.base, routine.task):
+            return False
+        return not (move.base.world and self._is_service(routine))
+
+    def _is_matched(self, base: Frame, task: str) -> bool:
+        """Whether a matched spot of the task uses the base, under this or another name."""
+        key = (task, id(base))
+        if key not in self._found:
+            self._found[key] = any(task == other_task and _same(base, other) for other_task, other in self._bases)
+        return self._found[key]
+
+    def _refusal(self, move: Move, routine: Routine) -> Refusal | None:
+        name = str(move.target) if move.target is not None else f"{move.instruction}@{move.line}"
+
+        def refuse(code: str, message: str) -> Refusal:
+            return Refusal(move.program, name, code, message, move.path, move.line)
+
+        if move.target is not None and move.target.kind is TargetKind.JOINTS:
+            return None
+        if move.target is None and move.offset is None:
+            return refuse("RUN_TIME_POSE", move.unknown) if move.unknown else None
+        if move.base is None:
+            return refuse("UNKNOWN_FRAME", move.unknown or "the program does not tell the base of this motion")
+        if move.base.pose is None:
+            return refuse("UNKNOWN_FRAME", f"base {move.base}: {move.base.unknown}")
+        elsewhere = id(routine) not in self._core or self._is_service(routine)
+        if move.base.world and not self._is_matched(move.base, routine.task) and not elsewhere:
+            message = (
+                f"{move.routine} welds under other bases but goes to this target in the world frame: "
+                "respot cannot tell whether it belongs to the part"
+            )
+            return refuse("WORLD_BASE", message)
+        if not self._moves(move, routine):
+            return None
+        if move.external_tcp:
+            return refuse("EXTERNAL_TCP", "the robot holds the part; correcting such targets is not supported yet")
+        if move.unknown:
+            return refuse("RUN_TIME_POSE", move.unknown)
+        if move.target is not None and move.target.pose is None:
+            return refuse("RUN_TIME_POSE", move.target.unknown)
+        if move.offset is not None and not move.offset.literal:
+            return refuse(
+                "RUN_TIME_POSE", "the offset along the base is computed while the robot runs, or turns the tool"
+            )
+        return None
+
+    def _decide_target(self, scope: Scope, target: Target, moves: list[Move]) -> None:
+        everywhere = self._everywhere.get(id(target), [])
+        if target.kind is TargetKind.JOINTS:
+            scope.stays.append(Stay(target, "JOINT_TARGET"))
+            return
+        if not moves:
+            same_base = any(
+                move.base is not None and self._is_matched(move.base, self._task_of[id(move)]) for move in everywhere
+            )
+            code = "SAME_BASE_STAYS" if same_base else "OUT_OF_SCOPE" if everywhere else "NOT_REACHED"
+            scope.stays.append(Stay(target, code))
+            return
+        base = moves[0].base
+        used = {id(move.base): move.base for move in everywhere}
+        if base is None or any(other is None or not _same(base, other) for other in used.values()):
+            names = " and ".join("an unknown base" if other is None else str(other) for other in used.values())
+            message = f"it is used under {names}: one literal cannot be right in both"
+            first = moves[0]
+            refusal = Refusal(first.program, target.name, "SHARED_TARGET", message, first.path, first.line)
+            scope.refusals.append(refusal)
+            return
+        scope.moving.append(Moving(target, base, everywhere))
 
 
-def _routines(robot: Robot, spots: Sequence[Move], programs: str | None) -> tuple[list[Routine], set[int]]:
-    """Routines in scope, and which of them weld or are called by one that does."""
+def _same(first: Frame, second: Frame) -> bool:
+    """Whether two frames are one, or lie in the same place."""
+    if first is second:
+        return True
+    if first.pose is None or second.pose is None or first.held != second.held:
+        return False
+    near = float(distance_mm(first.pose, second.pose)) <= SAME_POSITION_MM
+    return near and float(turn_deg(first.pose, second.pose)) <= SAME_ROTATION_DEG
+
+
+def _routines(robot: Robot, welding: set[int], programs: str | None) -> tuple[set[int], set[int]]:
+    """Routines that weld or are called by one that does, and routines that call them."""
     if programs is not None:
-        found = [r for r in robot.routines if fnmatch.fnmatchcase(r.program.lower(), programs.lower())]
-        return found, {id(routine) for routine in found}
-    held = {id(move) for move in spots}
+        return {id(r) for r in robot.routines if fnmatch.fnmatchcase(r.program.lower(), programs.lower())}, set()
     calls = _calls(robot)
-    holding = [routine for routine in robot.routines if any(id(move) in held for move in routine.moves)]
-    core = _reach(holding, calls)
+    holding = [routine for routine in robot.routines if id(routine) in welding]
     callers: dict[int, list[Routine]] = {}
     for routine in robot.routines:
         for called in calls[id(routine)]:
             callers.setdefault(id(called), []).append(routine)
-    wide = _reach(holding, callers) | core
-    return [routine for routine in robot.routines if id(routine) in wide], core
+    return _reach(holding, calls), _reach(holding, callers)
 
 
 def _calls(robot: Robot) -> dict[int, list[Routine]]:
-    """Routines that each routine calls; a routine of the same program hides others of its name."""
-    by_name: dict[str, list[Routine]] = {}
+    """Routines of its task that each routine calls; one of the same program hides others of its name."""
+    by_name: dict[tuple[str, str], list[Routine]] = {}
     for routine in robot.routines:
-        by_name.setdefault(routine.name.lower(), []).append(routine)
+        by_name.setdefault((routine.task, routine.name.lower()), []).append(routine)
     calls: dict[int, list[Routine]] = {}
     for routine in robot.routines:
         called = calls.setdefault(id(routine), [])
         for name in routine.calls:
-            named = by_name.get(name.lower(), [])
+            named = by_name.get((routine.task, name.lower()), [])
             called += [other for other in named if other.program == routine.program] or named
     return calls
 
@@ -156,65 +272,3 @@ def _reach(start: Iterable[Routine], edges: Mapping[int, Sequence[Routine]]) -> 
             found.add(id(routine))
             pending += edges.get(id(routine), ())
     return found
-
-
-def _refusal(move: Move, bases: set[int], language: Language, calls_only: bool) -> Refusal | None:
-    name = str(move.target) if move.target is not None else f"{move.instruction}@{move.line}"
-
-    def refuse(code: str, message: str) -> Refusal:
-        return Refusal(move.program, name, code, message, move.path, move.line)
-
-    if move.target is not None and move.target.kind is TargetKind.JOINTS:
-        return None
-    if move.target is None and move.offset is None:
-        return refuse("RUN_TIME_POSE", move.unknown) if move.unknown else None
-    if move.base is None:
-        return refuse("UNKNOWN_FRAME", move.unknown or "the program does not tell the base of this motion")
-    if move.base.pose is None:
-        return refuse("UNKNOWN_FRAME", f"base {move.base}: {move.base.unknown}")
-    elsewhere = calls_only or language.forms.is_service(move.routine)
-    if move.base.world and id(move.base) not in bases and not elsewhere:
-        message = (
-            f"{move.routine} welds under other bases but goes to this target in the world frame: "
-            "respot cannot tell whether it belongs to the part"
-        )
-        return refuse("WORLD_BASE", message)
-    if not _is_moving(move, bases, language):
-        return None
-    if move.external_tcp:
-        return refuse("EXTERNAL_TCP", "the robot holds the part; correcting such targets is not supported yet")
-    if move.unknown:
-        return refuse("RUN_TIME_POSE", move.unknown)
-    if move.target is not None and move.target.pose is None:
-        return refuse("RUN_TIME_POSE", move.target.unknown)
-    if move.offset is not None and not move.offset.literal:
-        return refuse("RUN_TIME_POSE", "the offset along the base is computed while the robot runs, or turns the tool")
-    return None
-
-
-def _is_moving(move: Move, bases: set[int], language: Language) -> bool:
-    if move.target is not None and move.target.kind is TargetKind.JOINTS:
-        return False
-    if move.base is None or id(move.base) not in bases:
-        return False
-    return not (move.base.world and language.forms.is_service(move.routine))
-
-
-def _decide(scope: Scope, target: Target, moves: list[Move], everywhere: list[Move], bases: set[int]) -> None:
-    if target.kind is TargetKind.JOINTS:
-        scope.stays.append(Stay(target, "JOINT_TARGET"))
-        return
-    if not moves:
-        same_base = any(id(move.base) in bases for move in everywhere)
-        code = "SAME_BASE_STAYS" if same_base else "OUT_OF_SCOPE" if everywhere else "NOT_REACHED"
-        scope.stays.append(Stay(target, code))
-        return
-    used = {id(move.base): move.base for move in everywhere}
-    base = moves[0].base
-    if len(used) > 1 or base is None:
-        names = " and ".join("an unknown base" if other is None else str(other) for other in used.values())
-        message = f"it is used under {names}: one literal cannot be right in both"
-        first = moves[0]
-        scope.refusals.append(Refusal(first.program, target.name, "SHARED_TARGET", message, first.path, first.line))
-        return
-    scope.moving.append(Moving(target, base, everywhere))

@@ -63,6 +63,8 @@ class Header:
         ``theory`` or ``measured``.
     source_sha256, calibration_sha256 : str
         Hash of the file before the change and of the calibration.
+    earlier : tuple of str
+        Hashes of calibrations that were applied to the file before.
     """
 
     version: str
@@ -70,6 +72,7 @@ class Header:
     kind: str
     source_sha256: str
     calibration_sha256: str
+    earlier: tuple[str, ...] = ()
 
 
 class Templates:
@@ -140,7 +143,7 @@ def templates(language: str, overlay: Path | None = None) -> Templates:
 
 #: A line of a header of ours, whatever the comment mark: ``;respot: ..``, ``  !respot: ..``
 _HEADER_LINE = re.compile(r"[ \t]*[;!]respot: [^\r\n]*(?:\r*\n|\r|$)")
-_APPLIED = re.compile(r"[;!]respot: calibration sha256 ([0-9a-f]{64})")
+_APPLIED = re.compile(r"[;!]respot: (?:earlier )?calibration sha256 ([0-9a-f]{64})")
 
 
 def header_span(source: SourceText, after_line: int) -> Span:

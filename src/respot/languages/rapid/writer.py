@@ -37,4 +37,9 @@ def header_place(file: ProgramFile) -> Span | None:
     head = next((statement for statement in file.statements if statement.kind == "module"), None)
     if head is None:
         return None
-    return header_span(file.source, file.source.place(head.end)[0])
+    line = file.source.place(head.end)[0]
+    for statement in file.statements:
+        # a declaration may begin behind MODULE and go on: no comment into its middle
+        if statement.line <= line < file.source.place(statement.end)[0]:
+            line = file.source.place(statement.end)[0]
+    return header_span(file.source, line)
