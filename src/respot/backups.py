@@ -52,9 +52,18 @@ class Backup:
         digest = hashlib.sha256()
         for path in sorted(self.files):
             data = self.files[path]
-            digest.update(f"{path}\0{len(data)}\0".encode())
+            digest.update(f"{path}\0{len(data)}\0".encode("utf-8", "surrogateescape"))
             digest.update(data)
         return digest.hexdigest()
+
+    def files_of(self, robot: Robot) -> dict[str, bytes]:
+        """Return the files of one robot; those of robots in folders below are not among them."""
+        inner = [other.root for other in self.robots if other.root != robot.root and other.root.startswith(robot.root)]
+        return {
+            path: data
+            for path, data in self.files.items()
+            if path.startswith(robot.root) and not any(path.startswith(root) for root in inner)
+        }
 
     def robot(self, name: str | None = None) -> Robot:
         """Return the one robot, or the robot of a name.
@@ -121,6 +130,12 @@ def _read_folder(path: Path) -> dict[str, bytes]:
             raise BadInputError("UNSAFE_ARCHIVE", "is a link; copy the backup without links", str(file))
         if file.is_file():
             files[file.relative_to(path).as_posix()] = file.read_bytes()
+    seen: dict[str, str] = {}
+    for name in files:
+        other = seen.setdefault(name.lower(), name)
+        if other != name:
+            message = f"holds {name} and {other}: a controller has only one of them"
+            raise BadInputError("UNSAFE_ARCHIVE", message, str(path))
     return files
 
 
@@ -178,6 +193,11 @@ def _robots(path: Path, files: Mapping[str, bytes]) -> Iterator[tuple[Language, 
         return
     for root, language_name in roots:
         language = LANGUAGES[language_name]
-        own = {name: data for name, data in files.items() if name.startswith(root)}
+        inner = [other for other, _ in roots if other != root and other.startswith(root)]
+        own = {
+            name: data
+            for name, data in files.items()
+            if name.startswith(root) and not any(name.startswith(other) for other in inner)
+        }
         if any(name.lower().endswith(tuple(language.suffixes)) for name in own):
             yield language, root, root.rstrip("/").rsplit("/", 1)[-1] or path.resolve().stem, own

@@ -69,6 +69,7 @@ def _target(move: Move, target: Target, ids: dict[int, str]) -> dict[str, Any]:
         "status": _whole(numbers.get("s")),
         "turn": _whole(numbers.get("t")),
         "confdata": [_whole(numbers[name]) for name in ("cf1", "cf4", "cf6", "cfx")] if "cf1" in numbers else None,
+        **({"part": {key: _pose(target.pose)[key] for key in ("x", "y", "z", "q")}} if move.external_tcp else {}),
         "world": None if world is None else {key: _pose(world)[key] for key in ("x", "y", "z", "q")},
     }
 

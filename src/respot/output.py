@@ -9,32 +9,34 @@ from __future__ import annotations
 import json
 import shutil
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from respot.correction.conversion import RECORD
 from respot.correction.correction import Correction
 from respot.correction.proof import prove
 from respot.issues import BadInputError
 
-RECORD = "respot.json"
 
-
-def check_output(folder: Path, force: bool, source: Path | None = None) -> None:
+def check_output(folder: Path, force: bool, inputs: Sequence[Path] = ()) -> None:
     """Refuse an output folder that would lose something: the source, or what is in it.
 
     Raises
     ------
     BadInputError
-        ``OUTPUT_EXISTS`` if it is a file, holds anything and ``force`` is not given, or is one with the source.
+        ``OUTPUT_EXISTS`` if it is a file, holds an input or lies in one, or holds anything: ``force`` replaces only
+        what respot wrote itself.
     """
-    if source is not None and _within(source, folder):
-        raise BadInputError(
-            "OUTPUT_EXISTS", f"holds the source {source} or lies in it; name another folder", str(folder)
-        )
+    for source in inputs:
+        if _within(source, folder):
+            raise BadInputError("OUTPUT_EXISTS", f"holds {source} or lies in it; name another folder", str(folder))
     if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
         raise BadInputError("OUTPUT_EXISTS", "is not a folder; name another one with -o", str(folder))
     if folder.is_dir() and any(folder.iterdir()) and not force:
         message = "exists and is not empty; name another one with -o, or replace it with --force"
+        raise BadInputError("OUTPUT_EXISTS", message, str(folder))
+    if folder.is_dir() and any(folder.iterdir()) and not (folder / RECORD).is_file():
+        message = f"holds no {RECORD}: --force replaces only what respot wrote; name another folder with -o"
         raise BadInputError("OUTPUT_EXISTS", message, str(folder))
 
 
@@ -111,10 +113,11 @@ def _move(staging: Path, folder: Path) -> None:
     old = Path(tempfile.mkdtemp(prefix=f".{folder.name}.old.", dir=folder.parent))
     try:
         folder.replace(old)
-        try:
-            staging.replace(folder)
-        except BaseException:
+        staging.replace(folder)
+    except BaseException:
+        if not folder.exists() and any(old.iterdir()):
             old.replace(folder)
-            raise
-    finally:
-        shutil.rmtree(old, ignore_errors=True)
+        else:
+            old.rmdir()
+        raise
+    shutil.rmtree(old, ignore_errors=True)

@@ -6,6 +6,7 @@ import os
 import signal
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from contextlib import contextmanager
 from itertools import islice
 from multiprocessing import get_context
 from typing import TypeVar
@@ -27,9 +28,7 @@ def cores() -> int:
         return os.cpu_count() or 1
 
 
-def run_each(
-    work: Callable[[_Item], _Result], items: Sequence[_Item], jobs: int = 1
-) -> Iterator[tuple[int, _Result]]:
+def run_each(work: Callable[[_Item], _Result], items: Sequence[_Item], jobs: int = 1) -> Iterator[tuple[int, _Result]]:
     """Run ``work`` on every item.
 
     Parameters
@@ -65,12 +64,26 @@ def _drain(
     queue = iter(items)
     while True:
         for index, item in islice(queue, ahead - len(pending)):
-            pending[pool.submit(work, item)] = index
+            with _without_interrupt():
+                pending[pool.submit(work, item)] = index
         if not pending:
             return
         done, _ = wait(pending, return_when=FIRST_COMPLETED)
         for future in done:
             yield pending.pop(future), future.result()
+
+
+@contextmanager
+def _without_interrupt() -> Iterator[None]:
+    """Hold Ctrl-C back while a worker is started: it would hit the worker before it can ignore it."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _ignore_interrupt() -> None:

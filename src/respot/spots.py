@@ -210,4 +210,5 @@ class _Chooser:
         if self._pattern is None:
             return list(move.spot_ids)
         matches = (self._pattern.search(name) for name in move.spot_ids)
-        return [match.group(1 if match.re.groups else 0) for match in matches if match]
+        found = (match.group(1 if match.re.groups else 0) for match in matches if match)
+        return [text for text in found if text]

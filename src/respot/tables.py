@@ -34,6 +34,8 @@ _CANONICAL = {alias: name for name, aliases in _ALIASES.items() for alias in ali
 _NEEDED = ("id", "x", "y", "z")
 _ANGLES, _QUATERNION = ("a", "b", "c"), ("q1", "q2", "q3", "q4")
 _UNIT = re.compile(r"[\[(]?(?:mm|deg|°)[\])]?$")
+#: No spot is farther from anything, mm; nan and infinities fail this as well.
+_FARTHEST = 1e7
 #: No table of spots is larger.
 _LARGEST_TABLE = 256 * 1024**2
 
@@ -79,7 +81,8 @@ def read_table(path: Path) -> Table:
     """
     text = _read_text(path)
     lines = text.splitlines()
-    start = next((number for number, line in enumerate(lines) if line.strip()), None)
+    # Excel writes its delimiter into a line of its own
+    start = next((n for n, line in enumerate(lines) if line.strip() and not line.startswith("sep=")), None)
     if start is None:
         raise BadInputError("BAD_TABLE", "is empty: a header row id,x,y,z and one row a spot are needed", str(path))
     delimiter = max(";,\t", key=lines[start].count)
@@ -149,11 +152,10 @@ def _ids(path: Path, cells: Sequence[str], lines: Sequence[int]) -> list[str]:
     for cell, line in zip(cells, lines, strict=True):
         if not cell:
             raise BadInputError("BAD_TABLE", "the spot has no ID", str(path), line)
-        if cell in seen:
-            raise BadInputError(
-                "DUPLICATE_ID", f"{cell} stands here and in line {seen[cell]}; keep one", str(path), line
-            )
-        seen[cell] = line
+        if cell.casefold() in seen:
+            message = f"{cell} stands here and in line {seen[cell.casefold()]}; keep one"
+            raise BadInputError("DUPLICATE_ID", message, str(path), line)
+        seen[cell.casefold()] = line
     return list(cells)
 
 
@@ -169,7 +171,7 @@ def _number(path: Path, cell: str, name: str, line: int, delimiter: str) -> floa
         value = float(text)
     except ValueError:
         value = math.nan
-    if not math.isfinite(value):
+    if not abs(value) < _FARTHEST:
         raise BadInputError(
             "NOT_A_NUMBER", f"{name} is {cell!r}; a finite number in mm or degrees is needed", str(path), line
         )

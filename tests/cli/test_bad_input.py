@@ -119,16 +119,52 @@ def test_an_output_folder_that_is_not_empty(respot, tmp_path, theory):
     result = respot("convert", SAMPLES / "abb", "--theory", theory, "-o", "full")
     refused(result, tmp_path, "OUTPUT_EXISTS", "--force")
     assert [path.name for path in (tmp_path / "full").iterdir()] == ["precious.txt"]
-    assert respot("convert", SAMPLES / "abb", "--theory", theory, "-o", "full", "--force").code == 0
-    assert not (tmp_path / "full" / "precious.txt").exists()
-    assert (tmp_path / "full" / "respot.json").is_file()
+    result = respot("convert", SAMPLES / "abb", "--theory", theory, "-o", "full", "--force")
+    refused(result, tmp_path, "OUTPUT_EXISTS", "only what respot wrote")
+    assert (tmp_path / "full" / "precious.txt").read_text() == "mine"
+
+
+def test_force_replaces_what_respot_wrote(respot, tmp_path, theory):
+    assert respot("convert", SAMPLES / "kuka", "--theory", theory, "-o", "done").code == 0
+    assert respot("convert", SAMPLES / "abb", "--theory", theory, "-o", "done").code == 2
+    assert (tmp_path / "done" / "KRC").is_dir()
+    assert respot("convert", SAMPLES / "abb", "--theory", theory, "-o", "done", "--force").code == 0
+    assert not (tmp_path / "done" / "KRC").exists()
+    assert (tmp_path / "done" / "RAPID").is_dir()
+
+
+@pytest.mark.parametrize("moment", ["before", "after"])
+def test_an_interrupt_between_the_renames_keeps_the_old_folder(respot, tmp_path, theory, monkeypatch, moment):
+    assert respot("convert", SAMPLES / "kuka", "--theory", theory, "-o", "done").code == 0
+    replace, calls = Path.replace, []
+
+    def interrupted(path: Path, target: Path) -> Path:
+        calls.append(path)
+        if len(calls) == 1 and moment == "after":
+            replace(path, target)
+        if len(calls) == 1:
+            raise KeyboardInterrupt
+        return replace(path, target)
+
+    monkeypatch.setattr(Path, "replace", interrupted)
+    assert respot("convert", SAMPLES / "abb", "--theory", theory, "-o", "done", "--force").code == 130
+    assert (tmp_path / "done" / "KRC").is_dir()
+    assert [path.name for path in tmp_path.iterdir()] == ["done"]
+
+
+def test_fit_writes_into_no_input(respot, tmp_path, theory):
+    shutil.copytree(SAMPLES / "abb", tmp_path / "abb")
+    shutil.copy(theory, tmp_path / "theory.csv")
+    for output in ("abb/cal.json", "theory.csv"):
+        refused(respot("fit", "abb", "--theory", "theory.csv", "-o", output, "--force"), tmp_path, "OUTPUT_EXISTS")
+    assert (tmp_path / "theory.csv").read_bytes() == theory.read_bytes()
 
 
 def test_an_output_folder_around_the_source(respot, tmp_path, theory):
     shutil.copytree(SAMPLES / "abb", tmp_path / "line" / "abb")
     for output in ("line", "line/abb", "line/abb/new"):
         result = respot("convert", "line/abb", "--theory", theory, "-o", output, "--force")
-        refused(result, tmp_path, "OUTPUT_EXISTS", "source")
+        refused(result, tmp_path, "OUTPUT_EXISTS", "line/abb")
     assert (tmp_path / "line" / "abb" / "system.xml").is_file()
 
 

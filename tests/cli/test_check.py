@@ -52,7 +52,9 @@ def test_an_opaque_statement_is_a_warning_with_its_place(respot, tmp_path):
     assert files(result)["a.src"]["opaque"] == 1
 
 
-@pytest.mark.parametrize("number", ["9E+09", "-0", "007", ".5", "1.", "2.80000E+06", "-1.5e-05", "+3.10", "- 4", "1E400"])
+@pytest.mark.parametrize(
+    "number", ["9E+09", "-0", "007", ".5", "1.", "2.80000E+06", "-1.5e-05", "+3.10", "- 4", "1E400"]
+)
 def test_every_spelling_of_a_number_is_rendered_again(respot, tmp_path, number):
     (tmp_path / "a.dat").write_text(f"DEFDAT a\nDECL REAL x={number}\nENDDAT\n")
     result = respot("check", "a.dat", "--json")

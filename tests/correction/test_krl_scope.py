@@ -261,3 +261,176 @@ def test_bytes_outside_the_numbers_survive(tmp_path, damage):
     number = re.compile(rb"-?\d+\.\d+")
     assert number.sub(b"#", new) == number.sub(b"#", old)
     assert new != old
+
+
+# --------------------------------------------------------------- what a hostile reader tried, each by what must not happen
+
+
+def twice(tmp_path, files, more: str, content: str):
+    return convert(tmp_path, {**files, more: content})
+
+
+def test_a_stale_copy_of_the_data_list_in_another_folder_is_not_the_live_one(tmp_path):
+    files = krl()
+    stale = files["KRC/R1/Program/weld.dat"].replace("E6POS", "E6POS")
+    done = twice(tmp_path, files, "KRC/R1/Program/zzold/weld.dat", stale)
+    assert done.code == 0, done.err
+    assert {edit["path"] for edit in done.record["edits"]} == {"KRC/R1/Program/weld.dat"}
+
+
+def test_a_global_point_of_the_robots_own_folder_wins_over_a_copy(tmp_path):
+    shared = "DEFDAT SHARED PUBLIC\n" + krl_point("G1", 10, 20, 30, kind="GLOBAL E6POS") + "ENDDAT\n"
+    files = krl(body=lin("G1"), data=fdat("G1"), more={"shared.dat": shared})
+    done = twice(tmp_path, files, "KRC/BackupOld/sharedx.dat", shared)
+    assert {edit["path"] for edit in done.record["edits"] if edit["target"] == "XG1"} == {"KRC/R1/Program/shared.dat"}
+
+
+def test_a_global_point_that_stands_twice_is_refused(tmp_path):
+    shared = "DEFDAT SHARED PUBLIC\n" + krl_point("G1", 10, 20, 30, kind="GLOBAL E6POS") + "ENDDAT\n"
+    files = krl(body=lin("G1"), data=fdat("G1"), more={"shared.dat": shared, "other.dat": shared})
+    assert {(program, code) for program, _, code in convert(tmp_path, files).refusals()} == {("weld", "RUN_TIME_POSE")}
+
+
+def test_names_that_differ_in_case_only_are_refused(tmp_path):
+    files = krl()
+    done = twice(tmp_path, files, "KRC/R1/Program/WELD.DAT", files["KRC/R1/Program/weld.dat"])
+    assert done.code == 2
+    assert "UNSAFE_ARCHIVE" in done.err
+
+
+P8 = krl_point("P8", 5, 6, 7) + fdat("P8")
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "BASE_DATA[1].A=BASE_DATA[1].A+90\n",
+        "BASE_DATA[N]=SOME\n",
+        "BASE_CORR_ON=TRUE\n",
+    ],
+)
+def test_a_base_that_the_program_changes_is_not_known(tmp_path, code):
+    done = convert(tmp_path, krl(body=code))
+    assert done.code == 2
+    assert "UNKNOWN_FRAME" in done.err
+
+
+@pytest.mark.parametrize(
+    ("code", "expected"),
+    [
+        ("FP8.BASE_NO=2\n" + lin("P8"), "UNKNOWN_FRAME"),
+        ("SHIFT(XP8)\n" + lin("P8"), "RUN_TIME_POSE"),
+        ("LOOP\nLIN XP8\n$BASE=BASE_DATA[2]\nENDLOOP\n", "UNKNOWN_FRAME"),
+        ("$BASE=BASE_DATA[2]\nWHILE A\n$BASE=BASE_DATA[1]\nENDWHILE\nLIN XP8\n", "UNKNOWN_FRAME"),
+        ("$BASE=BASE_DATA[2]\nGOTO L1\n$BASE=BASE_DATA[1]\nL1:\nLIN XP8\n", "UNKNOWN_FRAME"),
+        (
+            "SWITCH N\nCASE 1\nN=2\nCASE 2\n$BASE=BASE_DATA[2]\nDEFAULT\n$BASE=BASE_DATA[2]\nENDSWITCH\nLIN XP8\n",
+            "UNKNOWN_FRAME",
+        ),
+        ("SPLINE WITH $BASE=UNKNOWN[2]\nSPL XP8\nENDSPLINE\n", "UNKNOWN_FRAME"),
+        ("BAS(#EX_BASE,2)\nLIN XP8\n", "UNKNOWN_FRAME"),
+        ("A=SETB(2)\nLIN XP8\n", "UNKNOWN_FRAME"),
+        ("SET_BASE2( )\nLIN XP8\n", "UNKNOWN_FRAME"),
+        ("TRIGGER WHEN DISTANCE=0 DELAY=0 DO SB()\nLIN XP8\n", "UNKNOWN_FRAME"),
+        ("LIN XP8 C_FOO BAR\n", "OPAQUE_STATEMENT"),
+        (lin("P8", "XS1:XP8"), "RUN_TIME_POSE"),
+        (lin("P8", "{X 0,Y 0,Z 50,A 0,B 0,C 0}:XP8"), "RUN_TIME_POSE"),
+        (lin("P8", "$NULLFRAME:XP8"), "RUN_TIME_POSE"),
+        (lin("P8", "{A 10,B 20,C 40}"), "RUN_TIME_POSE"),
+        ("DECL E6POS XG\n" + lin("P8", "XG"), "RUN_TIME_POSE"),
+    ],
+)
+def test_what_is_not_certain_refuses_the_program(tmp_path, code, expected):
+    files = krl(body=code, data=P8)
+    files["KRC/R1/System/$config.dat"] = files["KRC/R1/System/$config.dat"].replace(
+        "ENDDAT", krl_point("G", 9, 9, 9) + "ENDDAT"
+    )
+    done = convert(tmp_path, files)
+    assert done.code == 1
+    assert expected in {found for _, _, found in done.refusals()}
+    assert_all_as_before(done, files)
+
+
+def test_an_array_element_that_the_program_changes_is_refused(tmp_path):
+    data = "DECL E6POS XA[1]\nXA[1]={X 1.0,Y 2.0,Z 3.0,A 0.0,B 0.0,C 0.0}\n"
+    done = convert(tmp_path, krl(body="XA[1].Z=XA[1].Z+300\nLIN XA[1]\n", data=data))
+    assert done.refusals() == {("weld", "XA[1]", "RUN_TIME_POSE")}
+
+
+def test_a_global_point_that_another_module_changes_is_refused(tmp_path):
+    shared = "DEFDAT SHARED PUBLIC\n" + krl_point("G1", 10, 20, 30, kind="GLOBAL E6POS") + "ENDDAT\n"
+    other = "DEF other( )\nXG1.Z=5\nEND\n"
+    done = convert(tmp_path, krl(body=lin("G1"), data=fdat("G1"), more={"shared.dat": shared, "other.src": other}))
+    assert done.refusals() == {("weld", "XG1", "RUN_TIME_POSE")}
+
+
+def test_a_parameter_hides_a_global_point(tmp_path):
+    files = krl(body="SUB1(XS1)\n", after="DEF SUB1(P :IN)\nDECL E6POS P\n$BASE=BASE_DATA[1]\nLIN P\nEND\n")
+    config = files["KRC/R1/System/$config.dat"]
+    files["KRC/R1/System/$config.dat"] = config.replace("ENDDAT", krl_point("", 9, 9, 9).replace("X=", "P=") + "ENDDAT")
+    done = convert(tmp_path, files)
+    assert {code for _, _, code in done.refusals()} == {"RUN_TIME_POSE"}
+    assert_all_as_before(done, files)
+
+
+def test_a_routine_that_uses_a_moved_point_comes_into_scope(tmp_path):
+    other = "DEF other( )\n" + lin("G1") + "LIN_REL {Y 100.0}\n" + lin("P9") + "END\n"
+    dat = "DEFDAT OTHER\n" + krl_point("P9", 1, 2, 3) + fdat("P9") + fdat("G1") + "ENDDAT\n"
+    shared = "DEFDAT SHARED PUBLIC\n" + krl_point("G1", 10, 20, 30, kind="GLOBAL E6POS") + "ENDDAT\n"
+    more = {"other.src": other, "other.dat": dat, "shared.dat": shared}
+    done = convert(tmp_path, krl(body=lin("G1"), data=fdat("G1"), more=more))
+    assert done.code == 0, done.err
+    assert {"XG1", "XP9"} <= done.edited()
+    assert "LIN_REL {Y 100.0}" not in done.text("other.src")
+
+
+def test_a_matched_spot_is_in_no_service_routine(tmp_path):
+    files = krl()
+    text = {path: content.replace("weld", "wartung").replace("WELD", "WARTUNG") for path, content in files.items()}
+    text = {
+        path.replace("weld", "wartung"): content.replace("BASE_NO 1", "BASE_NO 0") for path, content in text.items()
+    }
+    done = convert(tmp_path, text)
+    assert done.code == 0, done.err
+    assert done.edited() == {"XS1", "XS2", "XS3", "XS4"}
+
+
+def test_status_as_bits_is_a_configuration_too(tmp_path):
+    done = convert(tmp_path, krl(body=lin("P1"), data=krl_point("P1", 5, 6, 7, ",S 'B010',T 'B100010'") + fdat("P1")))
+    assert {code for _, _, code in done.refusals()} <= {"CONFIG_NOT_CHECKED", "CONFIG_INCONSISTENT"}
+    assert done.refusals()
+
+
+def test_equal_literal_bases_are_one(tmp_path):
+    frame = "$BASE={X 1000.0,Y 0.0,Z 500.0,A 90.0,B 0.0,C 0.0}\n"
+    files = krl(body=frame + "LIN XP8\n" + frame + "LIN XP9\n", data=P8 + krl_point("P9", 1, 1, 1))
+    assert {"XP8", "XP9"} <= convert(tmp_path, files).edited()
+
+
+def test_a_transition_through_a_called_routine_is_listed(tmp_path):
+    home = "DEF homer( )\nPTP XHOME\nEND\n"
+    done = convert(tmp_path, krl(body="homer( )\n" + lin("P8"), data=P8, more={"homer.src": home}))
+    assert {("XS4", "XHOME"), ("XHOME", "XP8")} <= {(t["from"], t["to"]) for t in done.record["transitions"]}
+
+
+def test_a_calibration_is_known_again_behind_another(tmp_path):
+    first = convert(tmp_path, krl())
+    second = convert_again(tmp_path, first.folder, translation=[5.0, 0.0, 0.0], name="second")
+    assert second.code == 0, second.err
+    third = convert_again(tmp_path, second.folder, name="third")
+    assert third.code == 2
+    assert "ALREADY_APPLIED" in third.err
+
+
+@pytest.mark.parametrize("number", ["1E400", "--5"])
+def test_numbers_that_no_controller_holds(tmp_path, number):
+    done = convert(tmp_path, krl(body=f"LIN {{X {number},Y 0,Z 0,A 0,B 0,C 0}}\n"))
+    assert done.code == 1
+    assert done.refusals()
+
+
+@pytest.mark.parametrize("options", [("--programs", "nosuch*"), ("--templates", "/nosuch")])
+def test_options_that_would_do_nothing(tmp_path, options):
+    done = convert(tmp_path, krl(), *options)
+    assert done.code == 2
+    assert "BAD_OPTION" in done.err

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 
 import numpy as np
@@ -192,3 +193,139 @@ def test_an_encoded_module_is_copied(tmp_path):
     assert done.code == 0, done.err
     assert (done.folder / "RAPID/TASK1/SYSMOD/GAP_USER.sys").read_bytes() == binary
     assert "BINARY_MODULE" in {issue["code"] for issue in done.record["issues"]}
+
+
+# --------------------------------------------------------------- what a hostile reader tried, each by what must not happen
+
+
+def test_local_work_objects_of_many_routines_are_kept_apart(tmp_path):
+    routines = "".join(
+        f'  PROC a{i}()\n    VAR wobjdata w:=[FALSE,TRUE,"",[[{1000 + i},0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];\n'
+        f"    MoveL {robtarget(1, 2, 3)},v100,z10,tGun\\WObj:=w;\n  ENDPROC\n"
+        for i in range(60)
+    )
+    files = rapid(after=routines)
+    convert(tmp_path, files, "--keep-config")
+    from typer.testing import CliRunner
+
+    from respot.cli import app
+
+    record = json.loads(CliRunner().invoke(app, ["inspect", str(tmp_path / "backup"), "--json"]).stdout)
+    worlds = {t["routine"]: t["world"]["x"] for t in record["robots"][0]["targets"] if t["routine"].startswith("a")}
+    assert worlds == {f"a{i}": 1001 + i for i in range(60)}
+
+
+def test_a_displacement_behind_a_compact_if_counts(tmp_path):
+    done = run(tmp_path, rapid(body="    IF b PDispSet peShift;\n"))
+    assert done.code == 2
+    assert "PDispSet" in done.err
+
+
+def test_another_task_that_changes_a_shared_work_object(tmp_path):
+    files = rapid()
+    files["RAPID/TASK2/PROGMOD/Other.mod"] = (
+        'MODULE Other\n  PERS wobjdata wDoor:=[FALSE,TRUE,"",[[0,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];\n'
+        "  PROC main()\n    wDoor.uframe.trans.x:=5;\n  ENDPROC\nENDMODULE\n"
+    )
+    done = run(tmp_path, files)
+    assert done.code == 2
+    assert "UNKNOWN_FRAME" in done.err
+
+
+def test_a_routine_that_changes_what_it_is_handed(tmp_path):
+    shift = "  PROC ShiftW(PERS wobjdata w)\n    w.oframe.trans.x:=5;\n  ENDPROC\n"
+    done = run(tmp_path, rapid(body="    ShiftW wDoor;\n", after=shift))
+    assert done.code == 2
+    assert "UNKNOWN_FRAME" in done.err
+
+
+def test_a_function_that_changes_the_target_it_is_handed(tmp_path):
+    adjust = "  FUNC bool Adj(INOUT robtarget p)\n    p.trans.x:=5;\n    RETURN TRUE;\n  ENDFUNC\n"
+    data = P1.replace("CONST", "PERS")
+    done = run(tmp_path, rapid(body="    ok:=Adj(p1);\n" + MOVE, data=data, after=adjust))
+    assert done.refusals() == {("Weld", "p1", "RUN_TIME_POSE")}
+
+
+def test_a_motion_without_a_comma_refuses_the_program(tmp_path):
+    files = rapid(body="    MoveL p1 v100,z10,tGun\\WObj:=wDoor;\n", data=P1)
+    done = run(tmp_path, files)
+    assert {code for _, _, code in done.refusals()} == {"OPAQUE_STATEMENT"}
+    assert_all_as_before(done, files)
+
+
+def test_a_wrapper_that_offsets_along_the_base_is_refused(tmp_path):
+    wrapper = (
+        "  PROC mvAbove(robtarget p,PERS tooldata t\\PERS wobjdata WObj)\n"
+        "    MoveL Offs(p,0,0,300),v100,z10,t\\WObj?WObj;\n  ENDPROC\n"
+    )
+    done = run(tmp_path, rapid(body="    mvAbove p1,tGun\\WObj:=wDoor;\n", data=P1, after=wrapper))
+    assert done.code == 1
+    assert done.edited() == set()
+
+
+def test_a_routine_that_uses_a_moved_target_comes_into_scope(tmp_path):
+    other = (
+        f"MODULE Srv\n  CONST robtarget p9:={robtarget(4, 5, 6)};\n  PROC rSrv()\n"
+        "    MoveL Offs(S1,0,100,0),v100,z10,tGun\\WObj:=wDoor;\n    MoveL p9,v100,z10,tGun\\WObj:=wDoor;\n"
+        "  ENDPROC\nENDMODULE\n"
+    )
+    done = run(tmp_path, rapid(more={"Srv.mod": other}))
+    assert done.code == 0, done.err
+    assert "p9" in done.edited()
+    assert "Offs(S1,0,100,0)" not in done.text("Srv.mod")
+
+
+def test_another_task_with_routines_of_the_same_names_stays(tmp_path):
+    sub = f"  PROC sub()\n    MoveL {robtarget(1, 2, 3)},v100,z10,tGun\\WObj:=wDoor;\n  ENDPROC\n"
+    files = rapid(body="    sub;\n", after=sub)
+    second = {path.replace("TASK1", "TASK2"): text.replace("PERS", "TASK PERS") for path, text in files.items()}
+    second = {path: text.replace("SpotL", "MoveJ").replace("gun1,sd1,", "z10,") for path, text in second.items()}
+    done = run(tmp_path, {**files, **second})
+    assert done.code == 0, done.err
+    assert {edit["path"] for edit in done.record["edits"]} == {"RAPID/TASK1/PROGMOD/Weld.mod"}
+
+
+def test_a_held_work_object_is_no_fixed_base_even_if_the_tool_is_unknown(tmp_path):
+    files = {
+        path: text.replace("wDoor", "wPart") if path.endswith("Weld.mod") else text for path, text in rapid().items()
+    }
+    files["RAPID/TASK1/PROGMOD/Weld.mod"] = files["RAPID/TASK1/PROGMOD/Weld.mod"].replace("tGun", "tNowhere")
+    done = run(tmp_path, files)
+    assert done.code == 2
+    assert "EXTERNAL_TCP" in done.err
+
+
+def test_persistent_targets_of_several_tasks_are_copies(tmp_path):
+    files = rapid(body=MOVE, data=P1.replace("CONST", "PERS"))
+    files["RAPID/TASK2/PROGMOD/Two.mod"] = "MODULE Two\n" + P1.replace("CONST", "PERS") + "ENDMODULE\n"
+    assert run(tmp_path, files).refusals() == {("Weld", "p1", "RUN_TIME_POSE")}
+
+
+def test_a_file_with_several_modules_is_left_alone(tmp_path):
+    files = rapid()
+    files["RAPID/TASK1/PROGMOD/Both.prg"] = "MODULE A\nENDMODULE\nMODULE B\nENDMODULE\n"
+    done = run(tmp_path, files)
+    assert "SEVERAL_MODULES" in {issue["code"] for issue in done.record["issues"]}
+
+
+@pytest.mark.parametrize("data", ['CONST string s:=\n    "a";', "CONST num n:=1; CONST num m:=\n2;"])
+def test_the_header_stands_between_statements(tmp_path, data):
+    files = rapid()
+    path = "RAPID/TASK1/PROGMOD/Weld.mod"
+    files[path] = files[path].replace("MODULE Weld\n", f"MODULE Weld {data}\n", 1)
+    done = run(tmp_path, files)
+    assert done.code == 0, done.err
+    text = re.sub(r" *!respot: [^\r\n]*\r\n", "", done.text("Weld.mod"))
+    assert text.startswith(files[path].partition("  CONST robtarget")[0].replace("\n", "\r\n"))
+    assert re.search(r";\r\n  !respot: ", done.text("Weld.mod"))
+
+
+def test_a_fragment_without_a_module_is_not_corrected_twice(tmp_path):
+    files = rapid()
+    path = "RAPID/TASK1/PROGMOD/Weld.mod"
+    files[path] = files[path].replace("MODULE Weld\n", "").replace("ENDMODULE\n", "")
+    first = run(tmp_path, files)
+    assert first.code == 0, first.err
+    second = convert_again(tmp_path, first.folder, "--keep-config", name="second")
+    assert second.code == 2
+    assert "ALREADY_APPLIED" in second.err

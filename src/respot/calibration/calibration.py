@@ -131,6 +131,7 @@ class Calibration:
             "schema": SCHEMA,
             "kind": self.kind,
             "frame": self.frame,
+            "ids": sorted(self.ids),
             "rotation": self.rotation.tolist(),
             "translation": self.translation.tolist(),
         }

@@ -92,7 +92,7 @@ def convert_to(
     if output is None and not dry_run:
         raise BadInputError("BAD_OPTION", "give the new folder with -o OUTDIR, or --dry-run")
     if output is not None:
-        check_output(output, force, source)
+        check_output(output, force, [path for path in (source, reference, calibration) if path is not None])
     conversion = convert(source, reference, calibration, fit_options, chosen)
     if dry_run or output is None:
         rehearse(conversion.files, conversion.correction)

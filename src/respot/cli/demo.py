@@ -61,7 +61,8 @@ def run(
 
 def _check(output: Path) -> None:
     """A folder of an earlier demo may be replaced, no other."""
-    from respot.output import RECORD, check_output
+    from respot.correction.conversion import RECORD
+    from respot.output import check_output
 
     if output.is_dir():
         ours = all((output / robot / RECORD).is_file() for robot in ROBOTS)

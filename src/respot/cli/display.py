@@ -9,6 +9,8 @@ from dataclasses import dataclass
 
 import typer
 
+from respot.cli.outcome import printable
+
 
 @dataclass(frozen=True)
 class Column:
@@ -35,7 +37,7 @@ def terminal_width() -> int:
 def heading(text: str) -> None:
     """Print a heading."""
     typer.echo()
-    typer.secho(text, bold=True)
+    typer.secho(printable(text), bold=True)
 
 
 def line(text: str = "") -> None:
@@ -43,7 +45,7 @@ def line(text: str = "") -> None:
     if is_terminal():
         indent = " " * (len(text) - len(text.lstrip()) + 2)
         text = textwrap.fill(text, terminal_width(), subsequent_indent=indent, break_on_hyphens=False)
-    typer.echo(text)
+    typer.echo(printable(text))
 
 
 def table(columns: Sequence[Column], rows: Sequence[Sequence[str]], marked: Sequence[bool] = ()) -> None:
@@ -62,7 +64,7 @@ def _plain(columns: Sequence[Column], rows: Sequence[Sequence[str]]) -> None:
             cell.rjust(width) if column.number else cell.ljust(width)
             for cell, width, column in zip(row, widths, columns, strict=True)
         ]
-        typer.echo("  ".join(parts).rstrip())
+        typer.echo(printable("  ".join(parts).rstrip()))
 
 
 def _rich(columns: Sequence[Column], rows: Sequence[Sequence[str]], marked: Sequence[bool]) -> None:
@@ -76,5 +78,5 @@ def _rich(columns: Sequence[Column], rows: Sequence[Sequence[str]], marked: Sequ
         made.add_column(column.title, justify="right" if column.number else "left", no_wrap=True)
     for index, row in enumerate(rows):
         style = "yellow" if index < len(marked) and marked[index] else ""
-        made.add_row(*(Text(cell, style=style) for cell in row))
+        made.add_row(*(Text(printable(cell), style=style) for cell in row))
     Console().print(made)

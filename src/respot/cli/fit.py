@@ -46,6 +46,9 @@ def run(
             raise BadInputError(
                 "OUTPUT_EXISTS", "exists; name another file with -o, or replace it with --force", str(output)
             )
+        if output is not None and any(holds(path, output) for path in (source, reference)):
+            message = "lies in the source or the reference; name another file with -o"
+            raise BadInputError("OUTPUT_EXISTS", message, str(output))
         fitted = fit_source(source, reference, chosen)
         if output is not None:
             try:
@@ -56,6 +59,12 @@ def run(
         return Outcome("fit", data, lambda: show_fit(fitted, tolerance, output), list(fitted.issues))
 
     run_command(work, as_json, strict)
+
+
+def holds(source: Path, output: Path) -> bool:
+    """Whether writing ``output`` would change ``source``: it is the same file, or the source is a folder around it."""
+    own, other = source.resolve(), output.resolve()
+    return own == other or own in other.parents or own.with_suffix("") == other.with_suffix("")
 
 
 def reference_of(

@@ -57,12 +57,17 @@ class Outcome:
                 "issues": [issue.as_json() for issue in self.issues],
                 **self.data,
             }
-            typer.echo(json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False))
+            typer.echo(printable(json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False)))
         else:
             self.show()
             say(self.issues)
         if self.answer_is_no or (strict and has_errors(self.issues)):
             raise typer.Exit(NO)
+
+
+def printable(text: str) -> str:
+    r"""Text that any terminal takes: bytes of a file name that are no UTF-8 become ``\udcfc``, as JSON spells them."""
+    return text.encode("utf-8", "backslashreplace").decode()
 
 
 def say(issues: Iterable[Issue]) -> None:
@@ -74,7 +79,7 @@ def say(issues: Iterable[Issue]) -> None:
     for same in by_code.values():
         for issue in same[:_MOST_OF_A_CODE]:
             colour = {Level.ERROR: typer.colors.RED, Level.WARNING: typer.colors.YELLOW, Level.INFO: None}[issue.level]
-            typer.secho(f"{issue.level}: {issue}", err=True, fg=colour)
+            typer.secho(printable(f"{issue.level}: {issue}"), err=True, fg=colour)
         if len(same) > _MOST_OF_A_CODE:
             typer.echo(f"... and {len(same) - _MOST_OF_A_CODE} more {same[0].code}", err=True)
 
@@ -82,23 +87,22 @@ def say(issues: Iterable[Issue]) -> None:
 def run(make: Callable[[], Outcome], as_json: bool = False, strict: bool = False) -> None:
     """Run a command's work and turn every way it can end into words and an exit code."""
     try:
-        outcome = make()
+        make().emit(as_json, strict)
+        sys.stdout.flush()
+    except typer.Exit:
+        raise
+    except BrokenPipeError:  # the reader, such as `head`, has seen enough
+        sys.stdout = None
     except BadInputError as error:
-        typer.secho(f"error: {error.issue}", err=True, fg=typer.colors.RED)
+        typer.secho(printable(f"error: {error.issue}"), err=True, fg=typer.colors.RED)
         raise typer.Exit(BAD_INPUT) from None
     except KeyboardInterrupt:
         typer.echo("interrupted: nothing was left half-written", err=True)
         raise typer.Exit(INTERRUPTED) from None
     except Exception as error:
-        typer.secho(
-            f"internal error: {error}\nThe details are in {_log()}; please report it.", err=True, fg=typer.colors.RED
-        )
+        message = printable(f"internal error: {error}\nThe details are in {_log()}; please report it.")
+        typer.secho(message, err=True, fg=typer.colors.RED)
         raise typer.Exit(INTERNAL) from None
-    try:
-        outcome.emit(as_json, strict)
-        sys.stdout.flush()
-    except BrokenPipeError:  # the reader, such as `head`, has seen enough
-        sys.stdout = None
 
 
 def _log() -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +18,9 @@ from respot.issues import BadInputError, Issue
 from respot.program.moves import Move
 from respot.program.robot import Robot
 from respot.spots import Source, read_source
+
+#: Record of a conversion, in the output folder.
+RECORD = "respot.json"
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +57,7 @@ class Conversion:
         """Files of the robot as they were; of a backup with several robots only its own."""
         backup = self.source.backup
         assert backup is not None  # noqa: S101 - a conversion is made of a backup
-        return {path: data for path, data in backup.files.items() if path.startswith(self.robot.root)}
+        return backup.files_of(self.robot)
 
     def as_json(self) -> dict[str, Any]:
         """Record of INTERFACES.md, `convert`, without schema, version and issues."""
@@ -136,6 +140,7 @@ def convert(
             "to move programs onto another list of spots, give it with --theory"
         )
         raise BadInputError("BAD_OPTION", message)
+    _refuse_recorded(read, model.content_hash)
     moves = _moves_of(read, ids)
     if not moves:
         detail = f": {read.spots.issues[0]}" if read.spots.issues else ""
@@ -147,6 +152,24 @@ def convert(
         for refusal in correction.refused
     ]
     return Conversion(read, model, fitted, correction, [*issues, *refused, *correction.issues])
+
+
+def _applied(source: Source) -> list[str]:
+    """Hashes of the calibrations that the backup's own record says were applied to it."""
+    data = source.backup.files.get(RECORD) if source.backup is not None else None
+    if data is None:
+        return []
+    try:
+        applied = json.loads(data).get("applied", [])
+    except (ValueError, AttributeError):
+        return []
+    return [item for item in applied if isinstance(item, str)] if isinstance(applied, list) else []
+
+
+def _refuse_recorded(source: Source, calibration_hash: str) -> None:
+    if calibration_hash in _applied(source):
+        message = "this calibration was applied to this backup before: start from the original"
+        raise BadInputError("ALREADY_APPLIED", message, str(source.path / RECORD))
 
 
 def _moves_of(source: Source, ids: Sequence[str]) -> list[Move]:
@@ -170,6 +193,7 @@ def record_of(conversion: Conversion) -> dict[str, Any]:
         "source": str(conversion.source.path),
         "source_sha256": conversion.source.sha256,
         "verified": True,
+        "applied": [*_applied(conversion.source), conversion.calibration.content_hash],
         "issues": [issue.as_json() for issue in conversion.issues],
         "files": {
             path: {"before": _sha256(files[path]), "after": _sha256(data)} for path, data in correction.files.items()

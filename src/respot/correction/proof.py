@@ -40,8 +40,7 @@ def prove(correction: Correction, old: Mapping[str, bytes], new: Mapping[str, by
     if set(old) != set(new) or changed - set(correction.files):
         stray = sorted((set(old) ^ set(new)) | (changed - set(correction.files)))
         raise VerifyError(f"{stray[0]}: is not as it was, though nothing of it should change")
-    own = {path: data for path, data in new.items() if path.startswith(correction.robot.root)}
-    robot = correction.language.read_robot(correction.robot.name, correction.robot.root, own)
+    robot = correction.language.read_robot(correction.robot.name, correction.robot.root, new)
     literals_before, literals_after = _literals(correction.robot), _literals(robot)
     for path in correction.files:
         before, after = literals_before.get(path, []), literals_after.get(path, [])

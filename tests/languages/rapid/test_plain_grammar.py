@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import random
+import re
+from collections.abc import Iterator
+
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lark import Tree
 
 from respot.languages.rapid.syntax import ENCODINGS, NO_STATEMENT, SHAPES, TOKEN, read_statements
-from respot.program.statement import Node
+from respot.program.statement import Node, Statement
 from respot.source import SourceText
 
 NAMES = st.sampled_from(["a", "p10", "tGun", "x1", "Übung", "error1", "id", "iffy", "mod_1", "EXPO", "doIt", "<EXP>"])
@@ -153,6 +157,55 @@ def test_any_text(text: str) -> None:
     position = 0
     for statement in read_statements(source.text, source.line_starts):
         assert position <= statement.start < statement.end
-        assert not source.text[position : statement.start].strip(" \t\r\n\x1a").lstrip("!")[:0]
+        assert _is_gap(source.text[position : statement.start])
         assert statement.line == source.place(statement.start)[0]
         position = statement.end
+    assert _is_gap(source.text[position:])
+
+
+def _is_gap(text: str) -> bool:
+    return not re.sub(r"![^\r\n]*", "", text).strip("\x1a \t\r\n")
+
+
+def test_numbers_of_literals_with_any_signs() -> None:
+    """Statements that differ in signs share a pattern: every number has its own sign and place, first met or not."""
+    dice = random.Random(3)
+    texts = []
+    for index in range(400):
+        signs = [dice.choice(["", "-", "+", "- "]) for _ in range(5)]
+        first, second, third, fourth, fifth = (f"{sign}{dice.randrange(1, 99)}.5" for sign in signs)
+        texts += [
+            f"CONST t p{index}{{{index}}}:=[[{first},{second}],TRUE,[{third}]];",
+            f'MoveL Offs([{first},0x1F],{fourth}-2,-(3)),v{index},[{second},"-1",{fifth}]; ! -1',
+        ]
+    statements = _statements("\n".join(texts))
+    for text, statement in zip(texts, statements, strict=True):
+        plain = SHAPES.lark.parse(text, start="piece")
+        expected = sorted(_numbers(plain))
+        found = statement.numbers()
+        begin = statement.start
+        assert [(start - begin, end - begin) for start, end in found.spans] == expected
+        assert [text[start:end] for start, end in expected] == list(found.texts)
+        assert _plain(plain) == _shifted(_fast(statement.node), begin)
+
+
+def _statements(text: str) -> list[Statement]:
+    source = SourceText("a.mod", text.encode(), ENCODINGS)
+    return read_statements(source.text, source.line_starts)
+
+
+def _numbers(tree: Tree) -> Iterator[tuple[int, int]]:
+    inner = tree
+    while inner.data == "signed" and isinstance(inner.children[-1], Tree):
+        inner = inner.children[-1]
+    if inner.data == "number":
+        yield tree.meta.start_pos, tree.meta.end_pos
+        return
+    for child in tree.children:
+        if isinstance(child, Tree):
+            yield from _numbers(child)
+
+
+def _shifted(tree: tuple, by: int) -> tuple:
+    kind, start, end, *inner = tree
+    return (kind, start - by, end - by, *(_shifted(child, by) for child in inner))

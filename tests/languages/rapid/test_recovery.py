@@ -181,3 +181,10 @@ def test_unbalanced_blocks(read: Code, text: str, lines: list[int]) -> None:
     issues = block_issues("a.mod", read(text))
     assert [found.line for found in issues] == lines
     assert all(found.code == "UNBALANCED_BLOCK" and found.path == "a.mod" for found in issues)
+
+
+def test_a_stray_quote_is_no_string(code: Code) -> None:
+    """Both would be one token of the same look; neither may lend the other its shape."""
+    for lines in (['Foo ";', 'Foo "x";'], ['Bar "x";', 'Bar ";']):
+        kinds = {found.source: found.kind for found in code("\n".join(lines))}
+        assert kinds == {line: "call" if '"x"' in line else OPAQUE for line in lines}

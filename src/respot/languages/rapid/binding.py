@@ -259,6 +259,7 @@ class Binder:
             return _Operand(None, f"{node.text} is computed while the robot runs")
         if name == "reltool":
             return inner
+        inner = replace(inner, parameter=False)  # the wrapper's base is needed to turn the offset
         if inner.offset is not None:
             return replace(inner, unknown=inner.unknown or f"{node.text}: an Offs within an Offs is not understood")
         if len(values) != 4:

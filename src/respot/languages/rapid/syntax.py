@@ -24,7 +24,6 @@ TOKEN = re.compile(
     | (?P<name>[^\W\d]\w*)
     | (?P<number>0[xX][0-9A-Fa-f]+|0[oO][0-7]+|0[bB][01]+|(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)
     | (?P<string>"(?:[^"\r\n]|"")*")
-    | (?P<quote>")
     | %%%[^%]*%%%
     | <(?:TDN|DDN|RDN|PAR|ALT|DIM|SMT|VAR|EIT|CSE|EXP|ARG|ID)>
     | := | <> | <= | >=
