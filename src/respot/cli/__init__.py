@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from respot import __version__
-from respot.cli import check, convert, demo, fit, inspect
+from respot.cli import check, convert, demo, fit, inspect, robots
 
 app = typer.Typer(
     name="respot",
@@ -19,7 +19,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for name, command in {"demo": demo, "inspect": inspect, "fit": fit, "convert": convert, "check": check}.items():
+_COMMANDS = {"demo": demo, "inspect": inspect, "fit": fit, "convert": convert, "check": check, "robots": robots}
+for name, command in _COMMANDS.items():
     app.command(name, help=command.HELP)(command.run)
 
 

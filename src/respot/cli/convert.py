@@ -32,6 +32,7 @@ def run(
     ] = None,
     frame: options.FrameOption = None,
     robot_name: options.RobotName = None,
+    robot: options.RobotModel = None,
     spot_id: options.SpotId = None,
     noise: options.Noise = None,
     programs: Annotated[
@@ -58,8 +59,10 @@ def run(
 
     def work() -> Outcome:
         from respot.correction.options import CorrectionOptions
+        from respot.kinematics.robot_file import robot_of
 
-        chosen = CorrectionOptions(programs, shift_limits(max_shift), keep_config, partial, templates)
+        model = None if robot is None else robot_of(robot)
+        chosen = CorrectionOptions(programs, shift_limits(max_shift), keep_config, partial, templates, model)
         if calibration is not None:
             if theory or measured:
                 raise BadInputError("BAD_OPTION", "give either -c CAL.json or a reference to fit to, not both")

@@ -31,6 +31,14 @@ FrameOption = Annotated[
 RobotName = Annotated[
     str | None, typer.Option("--robot-name", help="Which robot of a backup with several.", show_default=False)
 ]
+RobotModel = Annotated[
+    str | None,
+    typer.Option(
+        "--robot",
+        help="Kinematics: a name that `respot robots` lists, or a TOML file. Without it the machine data decide.",
+        show_default=False,
+    ),
+]
 SpotId = Annotated[
     str | None,
     typer.Option("--spot-id", help="Regular expression for the spot ID in a target's name.", show_default=False),

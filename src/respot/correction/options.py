@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from respot.kinematics.model import RobotModel
+
 #: `--max-shift` of align, mm and degrees (DESIGN section 10).
 ALIGN_MAX_SHIFT = (150.0, 5.0)
 
@@ -25,6 +27,8 @@ class CorrectionOptions:
         Correct what can be corrected of a program with refused targets.
     templates : Path, optional
         A plant's own templates.
+    robot : RobotModel, optional
+        Kinematic model in place of the machine data's.
     """
 
     programs: str | None = None
@@ -32,3 +36,4 @@ class CorrectionOptions:
     keep_config: bool = False
     partial: bool = False
     templates: Path | None = None
+    robot: RobotModel | None = None

@@ -44,6 +44,22 @@ def _robot(row: dict[str, object]) -> BuiltIn:
     return BuiltIn(model, source, commit, note)
 
 
+def record_of(robot: BuiltIn) -> dict[str, object]:
+    """Record of a robot for JSON: lengths in mm, zero angles in degrees."""
+    model = robot.model
+    return {
+        "name": model.name,
+        "lengths": {name: getattr(model, name) for name in LENGTHS},
+        "offsets_deg": list(model.offsets_deg),
+        "signs": list(model.signs),
+        "coupled_23": model.coupled_23,
+        "limits": model.limits_text,
+        "source": robot.source,
+        "commit": robot.commit,
+        "note": robot.note,
+    }
+
+
 def find_robot(name: str) -> OpwRobot:
     """Return the robot of a name; letter case, blanks, dashes and underscores do not matter.
 

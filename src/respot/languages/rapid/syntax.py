@@ -393,9 +393,9 @@ class _Reader:
             return True
         kinds = self._last_kinds(begun)
         before = kinds[-1]
-        alone = begun.last in (begun.start, begun.joined) and len(kinds) == 1 and self._begins_line(begun.last)
+        alone = begun.last in (begun.start, begun.joined) and len(kinds) == 1
         if alone and before in _MAYBE_WHOLE:
-            return before in _WHOLE_JUMPS or self._indentation(start) <= self._indentation(begun.start)
+            return before in _WHOLE_JUMPS or self._is_left(start, begun)
         if not _is_operand(before):
             return not compact and before not in _BEFORE_TYPE and _begins_anyway(line, before)
         if compact:
@@ -405,7 +405,7 @@ class _Reader:
             return False
         if alone:
             # a procedure without arguments and no `;`, or one whose arguments stand in the next line: further right
-            return self._indentation(start) <= self._indentation(begun.start)
+            return self._is_left(start, begun)
         return True
 
     def _leaves_head(self, begun: _Begun) -> bool:
@@ -421,9 +421,11 @@ class _Reader:
         begin = max(begun.last, begun.stop - LONGEST_STATEMENT)
         return SHAPES.kinds(self._text[begin : begun.stop])[0]
 
-    def _begins_line(self, offset: int) -> bool:
-        begin = self._line_starts[bisect_right(self._line_starts, offset) - 1]
-        return not self._text[begin:offset].strip(_BLANK)
+    def _is_left(self, start: int, begun: _Begun) -> bool:
+        """Whether a line is not further right than the one on which a statement begins, first of all on it."""
+        begin = self._line_starts[bisect_right(self._line_starts, begun.last) - 1]
+        first = not self._text[begin : begun.last].strip(_BLANK)
+        return first and self._indentation(start) <= self._indentation(begun.start)
 
     def _indentation(self, offset: int) -> int:
         begin = self._line_starts[bisect_right(self._line_starts, offset) - 1]
