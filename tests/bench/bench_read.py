@@ -1,9 +1,10 @@
 """How fast programs are read, against the plain grammar, in one run.
 
-Usage: ``python tests/bench/bench_read.py [--megabytes 5] [--repeat 3] [--memory] [--peers PYTHON] [--corpus PATH...]``
+Usage: ``python tests/bench/bench_read.py [--megabytes 5] [--repeat 3] [--memory] [--peers PYTHON] [--antlr DIR]
+[--corpus PATH...]``
 
 Both sides turn bytes into statements and read every number of every member of every aggregate, as a number with its place;
-what they find is compared. The baseline is our own grammar on the whole file: Lark, LALR, contextual lexer, Python's
+what they find is compared; peers only parse. The baseline is our own grammar on the whole file: Lark, LALR, contextual lexer, Python's
 default garbage collector. ``--corpus`` takes what `scripts/corpus.py` takes; without it the mixed programs are made up.
 """
 
@@ -30,7 +31,7 @@ from respot.languages.krl import syntax as krl
 from respot.languages.rapid import syntax as rapid
 from respot.languages.rapid.recognition import looks_like_rapid
 from respot.languages.shapes import Shapes
-from respot.program.statement import Statement, number
+from respot.program.statement import OPAQUE, Statement, number
 from respot.resources import resource
 from respot.source import SourceText, Span
 
@@ -437,33 +438,81 @@ for path in sys.argv[1:]:
 print(json.dumps([time.process_time() - begin, read]))
 """,
     ),
+    "ANTLR": (
+        "krl",
+        """
+import contextlib, importlib, json, pathlib, sys, time
+folder = pathlib.Path(sys.argv[1])
+sys.path.insert(0, str(folder))
+from antlr4 import CommonTokenStream, InputStream
+from antlr4.error.ErrorListener import ErrorListener
+class Errors(ErrorListener):
+    count = 0
+    def syntaxError(self, *_):
+        self.count += 1
+def made(suffix):
+    name, = (path.stem for path in folder.glob("*" + suffix + ".py"))
+    return getattr(importlib.import_module(name), name)
+Lexer, Parser = made("Lexer"), made("Parser")
+read, begin = 0, time.process_time()
+for path in sys.argv[2:]:
+    errors = Errors()
+    lexer = Lexer(InputStream(pathlib.Path(path).read_bytes().removeprefix(b"\xef\xbb\xbf").decode("cp1252", "replace")))
+    parser = Parser(CommonTokenStream(lexer))
+    for part in (lexer, parser):
+        part.removeErrorListeners()
+        part.addErrorListener(errors)
+    with contextlib.suppress(Exception):
+        getattr(parser, Parser.ruleNames[0])()
+        read += not errors.count
+print(json.dumps([time.process_time() - begin, read]))
+""",
+    ),
 }
-_PEER_FILES, _PEER_SECONDS = 30, 100
+#: How many files at most, and for how long.
+_PEER_LIMITS = {"krllint": (30, 100), "rapidchecker": (30, 100), "ANTLR": (1000, 400)}
 
 
-def peers(python: str, name: str, files: list[bytes], language: str) -> None:
-    """Print how fast other readers are on a part of the same input, and how many files they can read."""
-    part = files[:: max(1, len(files) // _PEER_FILES)]
-    with tempfile.TemporaryDirectory() as folder:
-        paths = []
-        for index, data in enumerate(part):
-            path = Path(folder) / f"a{index}{'.src' if language == 'krl' else '.mod'}"
-            path.write_bytes(data)
-            paths.append(str(path))
-        for peer, (spoken, code) in PEERS.items():
-            if spoken != language:
-                continue
+def peers(commands: dict[str, list[str]], name: str, files: list[bytes], language: str) -> None:
+    """Print how fast other readers, and then ours, are on a part of the same input, and how many files they can read."""
+    for peer, command in commands.items():
+        if PEERS[peer][0] != language:
+            continue
+        most, patience = _PEER_LIMITS[peer]
+        part = files[:: -(-len(files) // most)]
+        size = sum(map(len, part)) / 1e6
+        with tempfile.TemporaryDirectory() as folder:
+            paths = []
+            for index, data in enumerate(part):
+                path = Path(folder) / f"a{index}{'.src' if language == 'krl' else '.mod'}"
+                path.write_bytes(data)
+                paths.append(str(path))
             try:
-                done = subprocess.run(
-                    [python, "-c", code, *paths], capture_output=True, timeout=_PEER_SECONDS, check=True
-                )
+                done = subprocess.run([*command, *paths], capture_output=True, timeout=patience, check=True)
                 seconds, read = json.loads(done.stdout)
-                rate = sum(map(len, part)) / 1e6 / seconds
-                print(f"{name:24} {peer}: {rate:.3f} MB/s, {read} of {len(part)} files read")
+                print(f"{name:24} {peer}: {size:.2f} MB, {size / seconds:.3f} MB/s, {read} of {len(part)} files read")
             except subprocess.TimeoutExpired:
-                print(f"{name:24} {peer}: not done after {_PEER_SECONDS} s with {sum(map(len, part)) / 1e6:.2f} MB")
+                print(f"{name:24} {peer}: not done after {patience} s with {size:.2f} MB")
             except subprocess.CalledProcessError:
                 print(f"{name:24} {peer}: not installed")
+                continue
+        _forget(LANGUAGES[language])
+        begin, read = time.process_time(), 0
+        for data in part:
+            read += not _opaque(data, LANGUAGES[language])
+        seconds = time.process_time() - begin
+        print(f"{name:24} ours on the same: {size / seconds:.3f} MB/s, {read} of {len(part)} files read", flush=True)
+
+
+def _opaque(data: bytes, language: Language) -> bool:
+    """Read a file as `ours` does and tell whether there is a statement that was not understood."""
+    source = SourceText("", data, language.encodings)
+    opaque = False
+    for statement in language.read(source.text, source.line_starts):
+        opaque = opaque or statement.kind == OPAQUE
+        if statement.kind in language.kinds:
+            _ = statement.numbers().values
+    return opaque
 
 
 def main() -> None:
@@ -475,6 +524,7 @@ def main() -> None:
     parser.add_argument("--language", choices=sorted(LANGUAGES), action="append")
     parser.add_argument("--corpus", type=Path, nargs="+", default=[], help="repositories of real programs")
     parser.add_argument("--peers", metavar="PYTHON", help="a Python that has krllint and rapidchecker: run them too")
+    parser.add_argument("--antlr", metavar="DIR", help="a KRL parser that ANTLR generated for Python 3: run it too")
     arguments = parser.parse_args()
     size = int(arguments.megabytes * 1e6)
     cases: list[tuple[str, str, list[bytes]]] = [
@@ -501,7 +551,12 @@ def main() -> None:
     print(f"{'':24} {'MB':>7} {'files':>9} {'Lark MB/s':>9} {'ours MB/s':>9} {'ratio':>8} {'different':>9}")
     for name, language, files in cases:
         measure(name, files, LANGUAGES[language], arguments.repeat)
+    commands = {}
     if arguments.peers:
+        commands = {peer: [arguments.peers, "-c", PEERS[peer][1]] for peer in ("krllint", "rapidchecker")}
+    if arguments.antlr:
+        commands["ANTLR"] = [sys.executable, "-c", PEERS["ANTLR"][1], arguments.antlr]
+    if commands:
         small = [
             ("KRL point table", "krl", [krl_table(100_000)]),
             ("KRL programs, made up", "krl", krl_programs(200_000)),
@@ -511,7 +566,7 @@ def main() -> None:
         ]
         for name, language, files in small:
             if not arguments.language or language in arguments.language:
-                peers(arguments.peers, name, files, language)
+                peers(commands, name, files, language)
     if arguments.memory:
         for name, language, files in cases:
             if len(files) == 1:

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from respot.calibration import fit_spots, fit_tables
 from respot.calibration.effects import EFFECTS
 from respot.calibration.effects.naming import naming_evidence
+from respot.calibration.report import report
 from respot.registration.errors import RegistrationError
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -23,7 +24,7 @@ def near(*values):
 def test_the_numbers_that_must_come_out(points):
     ids, source, reference = points.rear_door()
     order = np.random.default_rng(0).permutation(14)
-    result = fit_tables(ids, source, [ids[k] for k in order], reference[order]).to_dict()
+    result = report(fit_tables(ids, source, [ids[k] for k in order], reference[order]))
     json.dumps(result, allow_nan=False)
     figures = {name: result[name] for name in ("as_found", "before", "after", "after_all")}
     assert (figures["as_found"]["mean"], figures["as_found"]["max"]) == near(76.190, 95.622)
@@ -44,7 +45,7 @@ def test_the_numbers_that_must_come_out(points):
 
 
 def test_the_exchange_is_one_named_effect_with_its_remedy(points):
-    (effect,) = fit_spots(*points.rear_door()).to_dict()["effects"]
+    (effect,) = report(fit_spots(*points.rear_door()))["effects"]
     assert effect["name"] == "swapped_ids"
     assert effect["name"] in EFFECTS
     assert effect["where"] == {"ids": list(points.SWAPPED)}
@@ -61,7 +62,7 @@ def test_the_exchange_is_one_named_effect_with_its_remedy(points):
 def test_a_spot_keeps_its_name_and_its_coordinates(points):
     ids, source, reference = points.rear_door()
     fit = fit_spots(ids, source, reference)
-    rows = {spot["id"]: spot for spot in fit.to_dict()["spots"]}
+    rows = {spot["id"]: spot for spot in report(fit)["spots"]}
     spot = rows["P02WP1615442"]
     assert spot["reference_id"] == "P02WP1609713"
     assert spot["repaired"]
@@ -78,9 +79,9 @@ def test_orientations_turn_with_the_points(points):
     rotation = points.turn((0, 0, 1), 30)
     reference = points.move(source, rotation, (1, 2, 3))
     tools = Rotation.from_euler("ZYX", [[10, 20, 30]] * 14, degrees=True)
-    spot = fit_spots(ids, source, reference, source_rotations=tools).to_dict()["spots"][4]
+    spot = report(fit_spots(ids, source, reference, source_rotations=tools))["spots"][4]
     assert (spot["a"], spot["b"], spot["c"]) == near(40, 20, 30)
-    np.testing.assert_allclose(fit_spots(ids, source, reference).to_dict()["transform"]["abc"], [30, 0, 0], atol=1e-8)
+    np.testing.assert_allclose(report(fit_spots(ids, source, reference))["transform"]["abc"], [30, 0, 0], atol=1e-8)
 
 
 @settings(max_examples=15, deadline=None)
@@ -91,7 +92,7 @@ def test_moving_the_table_and_exchanging_another_pair(points, seed):
     i, j = (int(k) for k in rng.choice(14, 2, replace=False))
     reference = points.move(reference, *points.random_motion(rng))
     reference[[i, j]] = reference[[j, i]]
-    result = fit_spots(ids, source, reference, kind="measured").to_dict()
+    result = report(fit_spots(ids, source, reference, kind="measured"))
     assert [set(effect["where"]["ids"]) for effect in result["effects"]] == [{ids[i], ids[j]}]
     assert result["after"]["rms"] == pytest.approx(5.163, abs=0.002)
     assert result["frame"] == "free"
@@ -102,7 +103,7 @@ def test_outliers_are_kept_out_and_still_reported(points):
     reference = reference.copy()
     reference[5] += [0, 0, 60]
     fit = fit_spots(ids, source, reference)
-    result = fit.to_dict()
+    result = report(fit)
     assert result["n_inliers"] == result["after"]["n"] == 13
     assert result["after_all"]["max"] > 50
     assert result["spots"][5]["inlier"] is False
@@ -133,12 +134,12 @@ def test_95_percent_intervals_hold_the_truth_95_times_in_100(points, n):
 def test_coplanar_spots_have_no_affine_solution(points):
     ids, source, _ = points.repaired()
     flat = source * [0, 1, 1]
-    assert fit_spots(ids, flat, flat + 1.0).to_dict()["affine_12"] is None
+    assert report(fit_spots(ids, flat, flat + 1.0))["affine_12"] is None
 
 
 def test_the_same_table_twice_is_the_identity(points):
     ids, source, _ = points.repaired()
-    result = fit_spots(ids, source, source).to_dict()
+    result = report(fit_spots(ids, source, source))
     assert result["after"]["max"] < 1e-9
     np.testing.assert_allclose(result["transform"]["rotation"], np.eye(3), atol=1e-12)
 

@@ -13,7 +13,6 @@ from scipy.spatial.transform import Rotation
 from respot.calibration.calibration import Calibration, Frame, Kind
 from respot.calibration.effects import swapped_ids
 from respot.calibration.effects.effect import Effect
-from respot.calibration.report import report
 from respot.calibration.uncertainty import TransformUncertainty, transform_uncertainty
 from respot.registration.alternatives import AffineFit, TranslationFit, fit_affine, fit_translation
 from respot.registration.errors import DegenerateError, RegistrationError
@@ -100,10 +99,6 @@ class SpotFit:
         """Which pairs (n,) got another name than they came with."""
         changed: NDArray[np.bool_] = self.exchanged.permutation != np.arange(len(self.ids))
         return changed
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the ``fit`` object of the JSON interface, without schema, version and issues."""
-        return report(self)
 
 
 def fit_tables(

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from respot.calibration.fit import SpotFit
 from respot.calibration.uncertainty import PARAMETERS
 from respot.geometry import abc_from_rotation
 from respot.registration.statistics import distances, rms
-
-if TYPE_CHECKING:
-    from respot.calibration.fit import SpotFit
 
 Array = NDArray[np.float64]
 

@@ -38,6 +38,7 @@ def run(
     """Run the command."""
 
     def work() -> Outcome:
+        from respot.calibration.report import report
         from respot.calibration.source_fit import fit_source
         from respot.cli.show_fit import show_fit
 
@@ -55,7 +56,7 @@ def run(
                 fitted.fit.calibration.save(output)
             except OSError as error:
                 raise BadInputError("CANNOT_READ", f"cannot be written: {error.strerror}", str(output)) from error
-        data = {**fitted.fit.to_dict(), "calibration_hash": fitted.fit.calibration.content_hash}
+        data = {**report(fitted.fit), "calibration_hash": fitted.fit.calibration.content_hash}
         return Outcome("fit", data, lambda: show_fit(fitted, tolerance, output), list(fitted.issues))
 
     run_command(work, as_json, strict)

@@ -11,6 +11,7 @@ from typing import Any
 
 from respot import __version__
 from respot.calibration.calibration import Calibration, CalibrationError
+from respot.calibration.report import report
 from respot.calibration.source_fit import FitOptions, SourceFit, fit_source
 from respot.correction.correction import Correction, align
 from respot.correction.options import CorrectionOptions
@@ -94,7 +95,7 @@ class Conversion:
             ],
         }
         if self.fitted is not None:
-            record["fit"] = self.fitted.fit.to_dict()
+            record["fit"] = report(self.fitted.fit)
         return record
 
 
