@@ -457,7 +457,7 @@ Lexer, Parser = made("Lexer"), made("Parser")
 read, begin = 0, time.process_time()
 for path in sys.argv[2:]:
     errors = Errors()
-    lexer = Lexer(InputStream(pathlib.Path(path).read_bytes().removeprefix(b"\xef\xbb\xbf").decode("cp1252", "replace")))
+    lexer = Lexer(InputStream(pathlib.Path(path).read_bytes().removeprefix(b"\\xef\\xbb\\xbf").decode("cp1252", "replace")))
     parser = Parser(CommonTokenStream(lexer))
     for part in (lexer, parser):
         part.removeErrorListeners()
@@ -493,8 +493,9 @@ def peers(commands: dict[str, list[str]], name: str, files: list[bytes], languag
                 print(f"{name:24} {peer}: {size:.2f} MB, {size / seconds:.3f} MB/s, {read} of {len(part)} files read")
             except subprocess.TimeoutExpired:
                 print(f"{name:24} {peer}: not done after {patience} s with {size:.2f} MB")
-            except subprocess.CalledProcessError:
-                print(f"{name:24} {peer}: not installed")
+            except subprocess.CalledProcessError as error:
+                reason = error.stderr.decode(errors="replace").splitlines()
+                print(f"{name:24} {peer}: does not run ({reason[-1] if reason else error.returncode})")
                 continue
         _forget(LANGUAGES[language])
         begin, read = time.process_time(), 0
@@ -511,7 +512,8 @@ def _opaque(data: bytes, language: Language) -> bool:
     for statement in language.read(source.text, source.line_starts):
         opaque = opaque or statement.kind == OPAQUE
         if statement.kind in language.kinds:
-            _ = statement.numbers().values
+            numbers = statement.numbers()
+            _ = list(zip(numbers.values, numbers.spans, strict=True))
     return opaque
 
 

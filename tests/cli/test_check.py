@@ -152,3 +152,10 @@ def test_missing_path(respot):
     result = respot("check", "nowhere")
     assert result.code == 2
     assert "CANNOT_READ" in result.err
+
+
+def test_nul_bytes_in_a_program_are_no_reason_to_skip_it(respot, tmp_path):
+    (tmp_path / "a.dat").write_bytes(b"DEFDAT a\r\n\0\0\r\nDECL INT x=1\r\nENDDAT\r\n")
+    result = respot("check", "a.dat", "--json")
+    record = files(result)["a.dat"]
+    assert (record["language"], record["opaque"], record["roundtrip"]) == ("krl", 1, True)

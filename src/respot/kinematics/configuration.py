@@ -7,7 +7,7 @@ numbers fit none of its solutions, a solution outside the limits, a pose out of 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -102,7 +102,7 @@ def taught_joints(
     old = np.atleast_2d(np.asarray(configuration, dtype=np.int64))
     if refused is not None or not isinstance(cell.model, OpwRobot):
         return np.full((len(old), 6), np.nan), (refused,) * len(old)
-    return _taught(cell, cell.model, _branches(cell, cell.model, tool2world, tool2flange, len(old)), old)
+    return _taught(cell, cell.model, solutions(cell, cell.model, tool2world, tool2flange, len(old)), old)
 
 
 def reconfigure(
@@ -111,20 +111,25 @@ def reconfigure(
     old_tool2world: RigidTransform,
     new_tool2world: RigidTransform,
     configuration: npt.ArrayLike,
+    new_tool2flange: RigidTransform | None = None,
 ) -> Reconfiguration:
-    """Status and turn, or confdata, of moved targets. The robot holds the tool; an external TCP is not handled here.
+    """Status and turn, or confdata, of moved targets.
 
     Parameters
     ----------
     cell : RobotCell
-        The robot.
+        The robot; one that moves with an external axis stands where `RobotCell.at` puts it.
     tool2flange : RigidTransform
-        TCP seen from the flange, one for all or n.
+        TCP seen from the flange, one for all or n. For an external TCP the old target seen from the flange.
     old_tool2world, new_tool2world : RigidTransform
-        TCP poses in the world before and after, one or n; the new ones as they are printed.
+        TCP poses in the world before and after, one or n; the new ones as they are printed. For an external TCP the
+        gun.
     configuration : array_like of int
         Old ``S, T`` (n, 2) or ``cf1, cf4, cf6, cfx`` (n, 4).
+    new_tool2flange : RigidTransform, optional
+        The same after the correction; without it the old one. For an external TCP the new target.
     """
+    new_tool = tool2flange if new_tool2flange is None else new_tool2flange
     old = np.atleast_2d(np.asarray(configuration, dtype=np.int64))
     old_joints, reasons = taught_joints(cell, tool2flange, old_tool2world, old)
     joints, result = np.full((len(old), 6), np.nan), old.copy()
@@ -132,15 +137,15 @@ def reconfigure(
     model = cell.model
     if not len(rows) or not isinstance(model, OpwRobot):
         return Reconfiguration(result, joints, old_joints, reasons)
-    branches = _branches(cell, model, new_tool2world, tool2flange, len(old))[rows]
-    joints[rows] = _nearest(model, branches, old_joints[rows])
+    branches = solutions(cell, model, new_tool2world, new_tool, len(old))
+    joints[rows] = nearest_solution(model, branches[rows], old_joints[rows])
     found = list(reasons)
     reached = rows[np.isfinite(joints[rows]).all(axis=1)]
     if len(reached):
         result[reached] = configuration_of(cell, joints[reached], old[reached])
     for row in rows:
         found[row] = (
-            _unreached(cell, model, new_tool2world, tool2flange, int(row))
+            _unreached(cell, model, new_tool2world, new_tool, int(row))
             if not np.isfinite(joints[row]).all()
             else _objection(cell, model, joints[row], old_joints[row], old[row])
         )
@@ -155,7 +160,7 @@ def _refused(cell: RobotCell) -> Reason | None:
     if not isinstance(cell.model, OpwRobot):
         return Reason("CONFIG_NOT_CHECKED", f"{name} has no spherical wrist: no status, turn or confdata")
     if cell.on_track:
-        return Reason("CONFIG_NOT_CHECKED", f"{name} stands on an external axis: its base is not known for each target")
+        return Reason("CONFIG_NOT_CHECKED", f"{name} stands on an external axis: where its base is, is not known")
     return None
 
 
@@ -169,7 +174,7 @@ def _scheme(cell: RobotCell) -> Scheme:
     return status_turn if cell.language == "krl" else confdata
 
 
-def _branches(
+def solutions(
     cell: RobotCell, model: OpwRobot, tool2world: RigidTransform, tool2flange: RigidTransform, count: int
 ) -> Array:
     """All solutions of n TCP poses, shape (n, 8, 6); NaN for a pose that is no number."""
@@ -234,7 +239,7 @@ def _differ(solutions: Array) -> bool:
     return bool(len(solutions) > 1 and np.ptp(solutions, axis=0).max() > 1e-3)
 
 
-def _nearest(model: OpwRobot, branches: Array, old_joints: Array) -> Array:
+def nearest_solution(model: OpwRobot, branches: Array, old_joints: Array) -> Array:
     """Of all solutions (n, 8, 6), with their full turns, the one nearest to the old joints (n, 6), same shape."""
     turned = nearest_turn(branches, old_joints[:, None, :], model.revolute)
     travel = np.linalg.norm(turned - old_joints[:, None, :], axis=-1)
@@ -246,10 +251,11 @@ def _unreached(
     cell: RobotCell, model: OpwRobot, tool2world: RigidTransform, tool2flange: RigidTransform, row: int
 ) -> Reason:
     """Say why a moved target has no joints."""
-    pose, tool = (poses if poses.single else poses[row] for poses in (tool2world, tool2flange))
-    if not np.isfinite(pose.translation).all():
+    world, tool, root = (p if p.single else p[row] for p in (tool2world, tool2flange, cell.robroot))
+    if not np.isfinite(world.translation).all():
         return Reason("OUT_OF_REACH", "the moved pose is not a number")
-    return Reason("OUT_OF_REACH", f"out of reach: {model.reach_text(cell.flange2base(pose, tool))}")
+    flange = replace(cell, robroot=root).flange2base(world, tool)
+    return Reason("OUT_OF_REACH", f"out of reach: {model.reach_text(flange)}")
 
 
 def _objection(cell: RobotCell, model: OpwRobot, joints: Array, old_joints: Array, old: Integers) -> Reason | None:

@@ -21,7 +21,12 @@ COLUMNS = ("mass", "moment_x", "moment_y", "moment_z")
 
 
 def gravity_in_base(cell: RobotCell) -> Array:
-    """Direction of gravity along the axes of the robot's base, shape (3,)."""
+    """Direction of gravity along the axes of the robot's base, shape (3,); (n, 3) for a cell at n places.
+
+    What the controller was told (``gravity_alpha``, ``gravity_beta`` of ``MOC.cfg``) goes before the base frame.
+    """
+    if cell.gravity is not None:
+        return np.asarray(cell.gravity)
     return np.asarray(cell.robroot.rotation.inv().apply(DOWN))
 
 
@@ -40,7 +45,7 @@ def gravity_basis(model: RobotModel, joints: npt.ArrayLike, gravity: npt.ArrayLi
     joints : array_like
         Joints (n, axes), degrees or mm.
     gravity : array_like
-        Unit vector of gravity in the base frame, shape (3,): `gravity_in_base`.
+        Unit vector of gravity in the base frame, shape (3,) or (n, 3): `gravity_in_base`.
     """
     chain = model.run(joints)
     down = np.asarray(gravity, dtype=float)
@@ -56,5 +61,5 @@ def gravity_basis(model: RobotModel, joints: npt.ArrayLike, gravity: npt.ArrayLi
                 found[:, j, k, 0] = np.einsum("ni,ni->n", position.T - origin, lever)
                 found[:, j, k, 1:] = np.stack([np.einsum("in,ni->n", column, lever) for column in columns], axis=-1)
             else:
-                found[:, j, k, 0] = axis @ down
+                found[:, j, k, 0] = np.sum(axis * down, axis=-1)
     return np.asarray(np.einsum("ij,nikl->njkl", model.coupling, found))
