@@ -110,9 +110,6 @@ def _literal(tree: Tree[Token]) -> list[Token] | None:
     return None
 
 
-# input
-
-
 def measure(name: str, files: list[bytes], language: Language, repeat: int) -> float:
     """Print one line of the table and return the ratio."""
     lark = Lark(

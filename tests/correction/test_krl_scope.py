@@ -434,3 +434,10 @@ def test_options_that_would_do_nothing(tmp_path, options):
     done = convert(tmp_path, krl(), *options)
     assert done.code == 2
     assert "BAD_OPTION" in done.err
+
+
+def test_a_program_that_comes_without_its_config_goes_home_all_the_same(tmp_path):
+    files = krl(body="PTP XHOME1\n")
+    assert convert(tmp_path, files).code == 0
+    elsewhere = krl(body="PTP XAWAY\n")
+    assert convert(tmp_path / "away", elsewhere).refusals() == {("weld", "PTP@19", "RUN_TIME_POSE")}

@@ -329,3 +329,7 @@ def test_a_fragment_without_a_module_is_not_corrected_twice(tmp_path):
     second = convert_again(tmp_path, first.folder, "--keep-config", name="second")
     assert second.code == 2
     assert "ALREADY_APPLIED" in second.err
+
+
+def test_joints_that_are_declared_elsewhere_do_not_refuse_a_program(tmp_path):
+    assert run(tmp_path, rapid(body="    MoveAbsJ jHome\\NoEOffs,v100,fine,tGun;\n")).code == 0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from itertools import pairwise
@@ -12,20 +12,30 @@ from scipy.spatial import Delaunay, QhullError
 from scipy.spatial.transform import RigidTransform
 
 from respot import __version__
-from respot.correction.configuration import configure, notes_of
+from respot.correction.configuration import configure
 from respot.correction.options import CorrectionOptions
-from respot.correction.points import PointEdit, moves_at_all, new_offset, new_pose, offset_edit, point_edit
+from respot.correction.points import (
+    PointEdit,
+    moves_at_all,
+    new_offset,
+    new_pose,
+    offset_edit,
+    point_edit,
+    printed_pose,
+)
+from respot.correction.preflight import Checked, Preflight
 from respot.correction.scope import Moving, Refusal, Scope, Stay, find_scope
+from respot.correction.sequence import sequences
 from respot.geometry import Array, distance_mm, turn_deg
 from respot.issues import BadInputError, Issue
+from respot.kinematics.cell import Reason, RobotCell
+from respot.kinematics.from_backup import cell_of
 from respot.languages import LANGUAGES, Language
 from respot.languages.writing import Header, applied_calibrations, templates
 from respot.program.moves import Move
-from respot.program.robot import Robot, Routine
+from respot.program.robot import Robot
 from respot.source import Edit, splice
 
-#: Calls within calls that transitions are followed through.
-_DEEPEST_CALL = 8
 #: What `--keep-config` may override: not a pose that the robot cannot reach.
 _KEPT = frozenset(("CONFIG_NOT_CHECKED", "CONFIG_INCONSISTENT", "UNKNOWN_TOOL"))
 
@@ -126,9 +136,11 @@ def align(
     after = {id(moving): new_pose(moving, source2reference) for moving in scope.moving}
     moving = [item for item in scope.moving if _moves(item, after[id(item)])]
     refused = [*scope.refusals, *_too_far(moving, after, options)]
-    configured = _configure(robot, moving, after, language, options, refused)
-    refused_programs = _refused_programs(scope, refused) if not options.partial else frozenset[str]()
-    kept = _Kept(refused, refused_programs, options.partial)
+    cell = cell_of(robot.machine, robot.language, options.robot)
+    printed = {id(item): _printed(robot, language, item, after[id(item)]) for item in moving}
+    configured = _configure(cell, moving, printed, language, options, refused)
+    flight = Preflight(cell, robot, language, scope, {id(i.target): printed[id(i)] for i in moving}, source2reference)
+    checked, kept, refused_programs = _preflight(flight, scope, moving, options, refused)
     edits = _edits(robot, language, options, kept, moving, after, configured, scope, source2reference)
     header = _Header("align", "theory", calibration_hash)
     return Correction(
@@ -143,7 +155,7 @@ def align(
         transitions=_transitions(robot, scope, {id(item.target) for item in moving}, refused_programs),
         files=_changed_files(robot, language, options, edits, header),
         reconfigured=all(id(item) in configured for item in moving if language.has_configuration(item.target)),
-        issues=_issues(robot, scope, moving, spot_moves, edits),
+        issues=[*_issues(robot, cell, scope, moving, spot_moves, edits), *checked.issues],
     )
 
 
@@ -185,6 +197,10 @@ def _check_options(robot: Robot, options: CorrectionOptions) -> None:
         raise BadInputError("BAD_OPTION", f"--programs {wanted} fits no program; there are {known}")
 
 
+def _printed(robot: Robot, language: Language, moving: Moving, after: RigidTransform) -> RigidTransform:
+    return printed_pose(moving.target, after, robot.files[moving.target.path].source.text, language)
+
+
 def _moves(moving: Moving, after: RigidTransform) -> bool:
     return moving.target.pose is not None and moves_at_all(moving.target.pose, after)
 
@@ -211,7 +227,7 @@ def _refusals(moving: Moving, code: str, message: str) -> list[Refusal]:
 
 
 def _configure(
-    robot: Robot,
+    cell: RobotCell | Reason,
     moving: Sequence[Moving],
     after: Mapping[int, RigidTransform],
     language: Language,
@@ -220,7 +236,7 @@ def _configure(
 ) -> dict[int, Mapping[str, float]]:
     """Configurations by target; targets without one are added to ``refused``."""
     carrying = [item for item in moving if language.has_configuration(item.target)]
-    results = configure(robot, language, carrying, [after[id(item)] for item in carrying])
+    results = configure(cell, language, carrying, [after[id(item)] for item in carrying])
     found: dict[int, Mapping[str, float]] = {}
     for item, result in zip(carrying, results, strict=True):
         if not result.code:
@@ -229,6 +245,26 @@ def _configure(
             hint = "; --keep-config keeps the old values" if result.code in _KEPT else ""
             refused += _refusals(item, result.code, f"{result.message}{hint}")
     return found
+
+
+def _preflight(
+    flight: Preflight, scope: Scope, moving: Sequence[Moving], options: CorrectionOptions, refused: list[Refusal]
+) -> tuple[Checked, _Kept, frozenset[str]]:
+    """Check what is going to be written; a refused program stays, and what remains is checked again."""
+    while True:
+        programs = _refused_programs(scope, refused) if not options.partial else frozenset[str]()
+        kept = _Kept(refused, programs, options.partial)
+        checked = flight.check({id(item.target) for item in moving if not kept(item.programs, item.target.name)})
+        known = {(refusal.program, refusal.target, refusal.code) for refusal in refused}
+        found = [
+            refusal
+            for refusal in checked.refusals
+            if (refusal.program, refusal.target, refusal.code) not in known
+            and not (options.keep_config and refusal.code in _KEPT)
+        ]
+        if not found:
+            return checked, kept, programs
+        refused += found
 
 
 def _refused_programs(scope: Scope, refused: Iterable[Refusal]) -> frozenset[str]:
@@ -290,13 +326,9 @@ def _changed_files(
 
 def _transitions(robot: Robot, scope: Scope, moved: set[int], refused_programs: frozenset[str]) -> list[Transition]:
     """Motions between moved and unmoved targets, in the order in which routines in scope call each other."""
-    calls: dict[tuple[str, str], Routine] = {}
-    for routine in robot.routines:
-        calls.setdefault((routine.task, routine.name.lower()), routine)
     found: dict[tuple[str, str, str, int], Transition] = {}
-    for routine in scope.routines:
-        moves = [move for move in _path(routine, calls, ()) if move.target is not None]
-        for first, second in pairwise(moves):
+    for sequence in sequences(robot, scope.routines):
+        for first, second in pairwise(move for move in sequence if move.target is not None):
             shifted = [id(m.target) in moved and m.program not in refused_programs for m in (first, second)]
             if shifted[0] != shifted[1]:
                 item = Transition(str(first.target), str(second.target), second.program, second.path, second.line)
@@ -304,26 +336,17 @@ def _transitions(robot: Robot, scope: Scope, moved: set[int], refused_programs: 
     return list(found.values())
 
 
-def _path(routine: Routine, calls: Mapping[tuple[str, str], Routine], above: tuple[int, ...]) -> Iterator[Move]:
-    """Motions of a routine and of what it calls, in order; a routine that calls itself is followed once."""
-    for step in routine.steps:
-        if isinstance(step, Move):
-            yield step
-        else:
-            called = calls.get((routine.task, step.name.lower()))
-            if called is not None and id(called) not in above and len(above) < _DEEPEST_CALL:
-                yield from _path(called, calls, (*above, id(routine)))
-
-
 def _issues(
     robot: Robot,
+    cell: RobotCell | Reason,
     scope: Scope,
     moving: Sequence[Moving],
     spot_moves: Sequence[Move],
     edits: Sequence[PointEdit],
 ) -> list[Issue]:
     issues = [Issue("NOT_CHECKED", "collisions are never checked: simulate or step through the programs before use")]
-    issues += [Issue("NOT_CHECKED", note) for note in notes_of(robot)]
+    unchecked = (f"reach, limits and joint travel: {cell}",) if isinstance(cell, Reason) else cell.notes
+    issues += [Issue("NOT_CHECKED", note) for note in unchecked]
     left = [stay.target.name for stay in scope.stays if stay.code == "SAME_BASE_STAYS"]
     if left:
         names = ", ".join(left[:10]) + (" ..." if len(left) > 10 else "")

@@ -13,12 +13,13 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from respot.correction.scope import Moving
-from respot.geometry import Array, distance_mm, turn_deg
+from respot.geometry import Array, distance_mm, rotation_from_abc, rotation_from_quaternion, turn_deg
 from respot.languages import Language
 from respot.languages.writing import Change, Templates, changes_of
 from respot.program.moves import BaseOffset, Move
+from respot.program.targets import Target
 from respot.source import Edit
-from respot.tolerance import LENGTH_DECIMALS, SAME_POSITION_MM, SAME_ROTATION_DEG, NumberStyle
+from respot.tolerance import LENGTH_DECIMALS, SAME_POSITION_MM, SAME_ROTATION_DEG, NumberStyle, spell
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +73,20 @@ def new_pose(moving: Moving, source2reference: RigidTransform) -> RigidTransform
     """Return the new ``target2base`` of a target."""
     assert moving.base.pose is not None and moving.target.pose is not None  # noqa: S101 - scope refuses both
     return in_base(moving.base.pose, source2reference) * moving.target.pose
+
+
+def printed_pose(target: Target, after: RigidTransform, text: str, language: Language) -> RigidTransform:
+    """Pose that the robot reads once ``after`` is written with the digits that the literal gets."""
+    values = language.pose_values(target, after)
+    read = {}
+    for name, value in values.items():
+        style = NumberStyle.of(text[slice(*target.numbers[name].span)]).at_least(language.decimals[name])
+        read[name] = float(spell(value, style))
+    numbers = list(read.values())
+    if len(numbers) not in (6, 7):
+        return after
+    rotation = rotation_from_quaternion(numbers[3:]) if len(numbers) == 7 else rotation_from_abc(numbers[3:])
+    return RigidTransform.from_components(numbers[:3], rotation)
 
 
 def point_edit(

@@ -9,18 +9,21 @@ import re
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform
+from scipy.spatial.transform import RigidTransform, Rotation
 
 from respot.geometry import Array, pose, rotation_from_quaternion
 from respot.kinematics.cell import Reason, RobotCell
 from respot.kinematics.model import RobotModel
 from respot.kinematics.opw import OpwRobot
 from respot.kinematics.robots import built_in_robots, similar_robots
+from respot.kinematics.track import Track
 from respot.program.robot import Machine
 from respot.tolerance import QUATERNION_NORM
 
 Row = Mapping[str, str]
 
+#: Sections of ``MOC.cfg`` that describe a mechanical unit with one axis.
+_UNIT = ("SINGLE", "SINGLE_TYPE", "JOINT")
 #: ``ROB1_6700_2.60_200``: robot of the controller, type, reach in m, payload in kg. Anything behind names a variant.
 _TYPE = re.compile(r"ROB\d+_(\w+?)_(\d+\.?\d*)_(\d+)", re.IGNORECASE)
 
@@ -46,21 +49,61 @@ def abb_cell(machine: Machine, model: RobotModel | None = None) -> RobotCell | R
             found = found.with_limits(limits)
     except ValueError as error:
         return _no(f"joint bounds in MOC.cfg: {error}")
-    track = robot.get("base_frame_coordinated", "")
-    if track:
-        notes.append(f"the robot stands on {track}: its base moves")
-    beta = _number(robot, "gravity_beta")
-    if beta:
-        notes.append(f"gravity_beta {beta:g} rad: mounted tilted as far as gravity is concerned")
+    track = _track(machine, robot, robroot)
+    if isinstance(track, Reason):
+        notes.append(f"the robot stands on {robot.get('base_frame_coordinated')}, its base moves: {track}")
+    elif track is not None:
+        notes.append(f"the robot stands on {track.name}: taken to run along the x axis of its base frame")
+    gravity, tilt = _gravity(robot)
     return RobotCell(
         model=found,
         language="rapid",
-        robroot=robroot,
+        robroot=track.base2world(np.zeros(6)) if isinstance(track, Track) else robroot,
         absolute_accuracy=bool(re.fullmatch(r"r\d+_calib", robot.get("use_robot_calib", ""), re.IGNORECASE)),
-        on_track=bool(track),
+        on_track=track is not None,
+        track=track if isinstance(track, Track) else None,
+        gravity=gravity,
         external_axes=len(_rows(machine, "SINGLE")),
-        notes=tuple(notes),
+        notes=(*notes, *tilt),
     )
+
+
+def _track(machine: Machine, robot: Row, robroot: RigidTransform) -> Track | Reason | None:
+    """What carries the robot (``base_frame_coordinated``): a SINGLE of mechanics TRACK; None where nothing does.
+
+    The SINGLE has its base frame, its joint's logical axis 7 is eax_a. The robot's base frame is seen from the
+    carriage.
+    """
+    unit = robot.get("base_frame_coordinated", "")
+    if not unit:
+        return None
+    singles, kinds, joints = ({r.get("name", ""): r for r in _rows(machine, k)} for k in _UNIT)
+    single = singles.get(unit)
+    if single is None:
+        return _no(f"MOC.cfg has no SINGLE {unit}")
+    mechanics = kinds.get(single.get("use_single_type", ""), {}).get("mechanics", "")
+    if mechanics.upper() != "TRACK":
+        return _no(f"{unit} is no TRACK but {mechanics or 'unknown'}")
+    axis = _number(joints.get(single.get("use_joint", ""), {}), "logical_axis")
+    if axis is None or axis not in range(7, 13):
+        return _no(f"the joint of {unit} has no logical axis from 7 to 12")
+    start = _base_frame(single)
+    if isinstance(start, Reason):
+        return start
+    return Track(int(axis) - 7, start, (1.0, 0.0, 0.0), robroot, name=unit)
+
+
+def _gravity(robot: Row) -> tuple[Array | None, list[str]]:
+    """Direction of gravity in the base, as ``gravity_beta`` (about y) or ``gravity_alpha`` (about x) tell it."""
+    angles = [_number(robot, f"gravity_{name}") or 0.0 for name in ("alpha", "beta")]
+    if not any(angles):
+        return None, []
+    if all(angles):
+        return None, ["gravity_alpha and gravity_beta are both set: gravity is taken to point down the world"]
+    tilted = Rotation.from_rotvec([*angles, 0.0])
+    name = "gravity_alpha" if angles[0] else "gravity_beta"
+    note = f"{name} {sum(angles):g} rad: mounted tilted as far as gravity is concerned"
+    return np.asarray(tilted.inv().apply([0.0, 0.0, -1.0])), [note]
 
 
 def robot_of_type(kind: str) -> OpwRobot | Reason:

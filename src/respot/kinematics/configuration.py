@@ -102,7 +102,7 @@ def taught_joints(
     old = np.atleast_2d(np.asarray(configuration, dtype=np.int64))
     if refused is not None or not isinstance(cell.model, OpwRobot):
         return np.full((len(old), 6), np.nan), (refused,) * len(old)
-    return _taught(cell, cell.model, solutions(cell, cell.model, tool2world, tool2flange, len(old)), old)
+    return _taught(cell, cell.model, all_solutions(cell, cell.model, tool2world, tool2flange, len(old)), old)
 
 
 def reconfigure(
@@ -137,7 +137,7 @@ def reconfigure(
     model = cell.model
     if not len(rows) or not isinstance(model, OpwRobot):
         return Reconfiguration(result, joints, old_joints, reasons)
-    branches = solutions(cell, model, new_tool2world, new_tool, len(old))
+    branches = all_solutions(cell, model, new_tool2world, new_tool, len(old))
     joints[rows] = nearest_solution(model, branches[rows], old_joints[rows])
     found = list(reasons)
     reached = rows[np.isfinite(joints[rows]).all(axis=1)]
@@ -174,18 +174,24 @@ def _scheme(cell: RobotCell) -> Scheme:
     return status_turn if cell.language == "krl" else confdata
 
 
-def solutions(
+def all_solutions(
     cell: RobotCell, model: OpwRobot, tool2world: RigidTransform, tool2flange: RigidTransform, count: int
 ) -> Array:
     """All solutions of n TCP poses, shape (n, 8, 6); NaN for a pose that is no number."""
-    finite = np.atleast_1d(np.isfinite(tool2world.translation).all(axis=-1))
-    if not finite.all():
-        places = np.nan_to_num(tool2world.translation, nan=0.0, posinf=0.0, neginf=0.0)
-        tool2world = RigidTransform.from_components(places, tool2world.rotation)
+    (tool2world, first), (tool2flange, second) = _finite(tool2world), _finite(tool2flange)
     found = np.array(model.inverse(cell.flange2base(tool2world, tool2flange)))
     found = np.array(np.broadcast_to(found, (count, *found.shape[1:])))
-    found[~np.broadcast_to(finite, count)] = np.nan
+    found[~np.broadcast_to(first & second, count)] = np.nan
     return found
+
+
+def _finite(poses: RigidTransform) -> tuple[RigidTransform, Bools]:
+    """Poses with zeros in place of what is no number, and which are numbers."""
+    finite = np.atleast_1d(np.isfinite(poses.translation).all(axis=-1))
+    if finite.all():
+        return poses, finite
+    places = np.nan_to_num(poses.translation, nan=0.0, posinf=0.0, neginf=0.0)
+    return RigidTransform.from_components(places, poses.rotation), finite
 
 
 def _taught(
@@ -252,7 +258,7 @@ def _unreached(
 ) -> Reason:
     """Say why a moved target has no joints."""
     world, tool, root = (p if p.single else p[row] for p in (tool2world, tool2flange, cell.robroot))
-    if not np.isfinite(world.translation).all():
+    if not (np.isfinite(world.translation).all() and np.isfinite(tool.translation).all()):
         return Reason("OUT_OF_REACH", "the moved pose is not a number")
     flange = replace(cell, robroot=root).flange2base(world, tool)
     return Reason("OUT_OF_REACH", f"out of reach: {model.reach_text(flange)}")

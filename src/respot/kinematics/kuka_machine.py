@@ -10,10 +10,11 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
-from respot.geometry import Array, pose, rotation_from_abc
+from respot.geometry import Array, distance_mm, pose, rotation_from_abc, turn_deg
 from respot.kinematics.cell import Reason, RobotCell
 from respot.kinematics.model import RobotModel
 from respot.kinematics.opw import OpwRobot
+from respot.kinematics.track import Track
 from respot.program.robot import Machine
 
 Values = Mapping[str, object]
@@ -41,6 +42,8 @@ FRAMES: dict[str, dict[str, float]] = {
     "$DH_5": {"DHART_A": 0.0, "DHART_D": 0.0, "DHART_ALPHA": -90.0},
 }
 SIGNS = (-1, 1, 1, -1, 1, -1)
+#: External axes as $ETn_AX names them.
+_EXTERNAL = tuple(f"#E{n}" for n in range(1, 7))
 OFFSETS = (0.0, -90.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -64,17 +67,20 @@ def kuka_cell(machine: Machine, robot: RobotModel | None = None) -> RobotCell | 
             return _no(f"software limits: {error}")
     if "$ROBROOT" not in values:
         notes.append("$ROBROOT is not in the machine data: the robot is taken to stand in the world's origin")
-    on_track = _on_track(values)
-    if on_track:
-        notes.append("the robot stands on an external axis ($EX_KIN, #ERSYS): its base moves")
+    track = _track(values, robroot)
+    if isinstance(track, Reason):
+        notes.append(f"the robot stands on an external axis ($EX_KIN, #ERSYS), its base moves: {track}")
+    elif track is not None:
+        notes.append(f"the robot stands on an external axis, {track.name}, as $ERSYSROOT and $ET1_.. say")
     count = values.get("$EX_AX_NUM", 0.0)
     accurate = str(values.get("$ABS_ACCUR", "")).upper() in ("#ACTIVE", "TRUE")
     return RobotCell(
         model=model,
         language="krl",
-        robroot=robroot,
+        robroot=robroot if not isinstance(track, Track) else track.base2world(np.zeros(6)),
         absolute_accuracy=accurate,
-        on_track=on_track,
+        on_track=track is not None,
+        track=track if isinstance(track, Track) else None,
         external_axes=int(count) if isinstance(count, float) else 0,
         notes=tuple(notes),
     )
@@ -130,10 +136,41 @@ def _limits(values: Values) -> tuple[Array | None, list[str]]:
     return limits, notes
 
 
-def _on_track(values: Values) -> bool:
-    """Whether an external kinematic carries the robot: a member of $EX_KIN is #ERSYS."""
+def _track(values: Values, robroot: RigidTransform) -> Track | Reason | None:
+    """What carries the robot: the member of $EX_KIN that is #ERSYS, with one axis; None where nothing does.
+
+    The chain is $ERSYSROOT, $ETn_TA1KR, the axis along or about its z, $ETn_TA2A1, $ETn_TA3A2, $ETn_TFLA3.
+    """
     kinematics = values.get("$EX_KIN")
-    return isinstance(kinematics, Mapping) and any(str(kind).upper() == "#ERSYS" for kind in kinematics.values())
+    members = kinematics if isinstance(kinematics, Mapping) else {}
+    carriers = [str(name).upper() for name, kind in members.items() if str(kind).upper() == "#ERSYS"]
+    if not carriers:
+        return None
+    chain = carriers[0]
+    axes = values.get(f"${chain}_AX")
+    driven = [str(axis).upper() for axis in axes.values()] if isinstance(axes, Mapping) else []
+    driven = [axis for axis in driven if axis != "#NONE"]
+    if len(carriers) > 1 or len(driven) != 1 or driven[0] not in _EXTERNAL:
+        return _no(f"${chain}_AX does not name one axis, or several kinematics carry the robot")
+    number = _EXTERNAL.index(driven[0])
+    kind = _plain(values.get(f"$AXIS_TYPE[{number + 7}]"))
+    keys = ("$ERSYSROOT", *(f"${chain}_{part}" for part in ("TA1KR", "TA2A1", "TA3A2", "TFLA3")))
+    found = [frame(values, key) for key in keys]
+    frames = [pose for pose in found if pose is not None]
+    if len(frames) < len(keys) or kind not in (1.0, 3.0, 5.0):
+        return _no(f"{', '.join(keys)} or $AXIS_TYPE[{number + 7}] is missing or does not hold what it should")
+    root, foot, *rest = frames
+    carriage = rest[0] * rest[1] * rest[2]
+    track = Track(number, root * foot, carriage=carriage, turns=kind != 1.0, name=f"E{number + 1}")
+    # with $ROBROOT of its own the machine data can be read in two ways, and nothing tells which
+    rest_pose = track.base2world(np.zeros(number + 1))
+    if not any(_same(robroot, known) for known in (RigidTransform.identity(), rest_pose)):
+        return _no("$ROBROOT is neither zero nor the place of the robot at zero")
+    return track
+
+
+def _same(first: RigidTransform, second: RigidTransform) -> bool:
+    return float(distance_mm(first, second)) < 1e-3 and float(turn_deg(first, second)) < 1e-4
 
 
 def frame(values: Values, key: str) -> RigidTransform | None:

@@ -6,7 +6,7 @@ not known and is left out.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +23,8 @@ NEAR_DEG, NEAR_MM = 2.0, 50.0
 LARGEST_CHANGE_DEG = 180.0
 #: Distance from a software limit that is worth a word [deg].
 LIMIT_MARGIN_DEG = 1.0
+#: A finding that was there before a correction is worse after it if so much of its margin is gone.
+WORSE = 0.1
 
 
 @dataclass(frozen=True)
@@ -37,11 +39,17 @@ class Finding:
         The motion; for a pair of motions the second.
     message : str
         What it is, with axis and angle.
+    subject : str
+        What it is about: an axis, a singularity, a branch.
+    room : float
+        What is left to the border, as a share of the distance that is worth a word; 0 where there is no distance.
     """
 
     code: str
     row: int
     message: str
+    subject: str = ""
+    room: float = 0.0
 
 
 def singularity_distances(model: OpwRobot, joints: npt.ArrayLike) -> Array:
@@ -82,6 +90,17 @@ def check_travel(before: npt.ArrayLike, after: npt.ArrayLike) -> list[Finding]:
     return found
 
 
+def made_worse(before: Iterable[Finding], after: Iterable[Finding]) -> list[Finding]:
+    """Findings that a correction brought, or made clearly worse; same rows."""
+    known = {(finding.code, finding.row, finding.subject): finding.room for finding in before}
+    worse = []
+    for finding in after:
+        room = known.get((finding.code, finding.row, finding.subject))
+        if room is None or room - finding.room > WORSE:
+            worse.append(finding)
+    return worse
+
+
 def _limits(cell: RobotCell, joints: Array) -> Iterator[Finding]:
     if cell.limits is None:
         return
@@ -89,15 +108,20 @@ def _limits(cell: RobotCell, joints: Array) -> Iterator[Finding]:
     for row, axis in np.argwhere(room < LIMIT_MARGIN_DEG):
         low, high = cell.limits[axis]
         text = f"axis {axis + 1} stands at {joints[row, axis]:.3f}, limits {low:g} .. {high:g}"
-        yield Finding("OUT_OF_LIMITS" if room[row, axis] < 0.0 else "NEAR_LIMIT", int(row), text)
+        code = "OUT_OF_LIMITS" if room[row, axis] < 0.0 else "NEAR_LIMIT"
+        yield Finding(code, int(row), text, f"axis {axis + 1}", float(room[row, axis]) / LIMIT_MARGIN_DEG)
 
 
 def _singularities(model: OpwRobot, joints: Array) -> Iterator[Finding]:
     names = ("the wrist centre stands {:.1f} mm from axis 1", "the arm is {:.2f} deg from stretched or folded",
              "axis 5 stands {:.2f} deg from 0: axes 4 and 6 are in line")  # fmt: skip
     distances = singularity_distances(model, joints)
-    for row, column in np.argwhere(distances < (NEAR_MM, NEAR_DEG, NEAR_DEG)):
-        yield Finding("NEAR_SINGULARITY", int(row), names[column].format(distances[row, column]))
+    margins = np.array([NEAR_MM, NEAR_DEG, NEAR_DEG])
+    for row, column in np.argwhere(distances < margins):
+        distance = float(distances[row, column])
+        subject = ("overhead", "elbow", "wrist")[column]
+        room = distance / float(margins[column])
+        yield Finding("NEAR_SINGULARITY", int(row), names[column].format(distance), subject, room)
 
 
 def _branch_changes(model: OpwRobot, joints: Array) -> Iterator[Finding]:
@@ -105,4 +129,4 @@ def _branch_changes(model: OpwRobot, joints: Array) -> Iterator[Finding]:
     known = np.flatnonzero(np.isfinite(joints).all(axis=1))
     behind = posture(model, joints[known]) < 0.0
     for pair, column in np.argwhere(behind[1:] != behind[:-1]):
-        yield Finding("BRANCH_CHANGE", int(known[pair + 1]), names[column])
+        yield Finding("BRANCH_CHANGE", int(known[pair + 1]), names[column], names[column])

@@ -25,6 +25,7 @@ class Forms:
     weld_instructions: re.Pattern[str] | None
     id_patterns: Sequence[re.Pattern[str]]
     data_id_patterns: Sequence[re.Pattern[str]]
+    home: re.Pattern[str] | None
     harmless: frozenset[str]
     service: Sequence[re.Pattern[str]]
 
@@ -32,13 +33,14 @@ class Forms:
     def load(cls, path: Path) -> Forms:
         """Read a profile file."""
         data = tomllib.loads(path.read_text(encoding="utf-8"))
-        instructions = data.get("weld_instruction")
+        instructions, home = data.get("weld_instruction"), data.get("home")
         spot_id = data.get("spot_id", {})
         return cls(
             weld_calls=[WeldCall(call["name"].upper(), call.get("argument", "").upper()) for call in data["weld_call"]],
             weld_instructions=re.compile(instructions, re.IGNORECASE) if instructions else None,
             id_patterns=_patterns(spot_id.get("names", [])),
             data_id_patterns=_patterns(spot_id.get("data", [])),
+            home=re.compile(home, re.IGNORECASE) if home else None,
             harmless=frozenset(name.upper() for name in data.get("harmless", {}).get("calls", [])),
             service=_patterns(data.get("service", {}).get("routines", [])),
         )
@@ -51,6 +53,10 @@ class Forms:
     def is_harmless(self, name: str) -> bool:
         """Whether a call is known to change neither frames nor positions."""
         return name.upper() in self.harmless or any(call.name == name.upper() for call in self.weld_calls)
+
+    def is_home(self, name: str) -> bool:
+        """Whether a position that the source does not declare is a home position: joints, which never move."""
+        return self.home is not None and bool(self.home.fullmatch(name))
 
     def is_service(self, routine: str) -> bool:
         """Whether a routine looks after the gun, by its name."""

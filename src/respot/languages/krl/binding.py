@@ -171,7 +171,7 @@ class Binder:
             return None, f"{name} is declared in the routine and has its position while the robot runs"
         symbol = self.symbols.find(name, module)
         if symbol is None:
-            return None, f"{name} is not declared with a position in this backup"
+            return None, "" if FORMS.is_home(name) else f"{name} is not declared with a position in this backup"
         if symbol.type == "AMBIGUOUS":
             return None, f"{name} is declared globally in more than one data list"
         target = self._targets.declared(symbol)

@@ -28,6 +28,7 @@ _INSTRUCTION = re.compile(
     re.IGNORECASE,
 )
 _JOINT = re.compile(r"(?:Move(?:Abs)?|SpotM?|Trigg|Calib)J", re.IGNORECASE)
+_JOINTS = re.compile(r"Move(?:AbsJ|ExtJ)", re.IGNORECASE)
 _CIRCULAR = re.compile(r"(?:Move|Trigg|Search|Arc)C", re.IGNORECASE)
 
 
@@ -129,7 +130,9 @@ class Binder:
         if self._hands_through(arguments, operands, tool, module, local):
             return []
         if not operands:
-            operands = [_Operand(None, f"{call.text} goes to a position that is computed while the robot runs")]
+            joints = _JOINTS.fullmatch(name) is not None  # wherever they come from, joints never move
+            reason = "" if joints else f"{call.text} goes to a position that is computed while the robot runs"
+            operands = [_Operand(None, reason)]
         elif tool is None and not flange and not instruction:
             reason = f"the position is handed to {name}, which respot does not know as a motion"
             operands = [replace(operand, unknown=operand.unknown or reason) for operand in operands]

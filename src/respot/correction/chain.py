@@ -1,0 +1,78 @@
+"""The kinematic chain of a motion: what the robot holds, what stands in the world, where its foot is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from respot.geometry import Array
+from respot.kinematics.cell import Reason, RobotCell
+from respot.program.moves import Move
+from respot.program.targets import Target
+
+#: External axes as the languages name them.
+EXTERNAL = {"krl": ("E1", "E2", "E3", "E4", "E5", "E6"), "rapid": tuple(f"eax_{letter}" for letter in "abcdef")}
+#: ABB's 9E9: the axis is not used.
+_UNUSED = 8e9
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """What `RobotCell.flange2base` needs, for one motion or n.
+
+    Parameters
+    ----------
+    tool2world, tool2flange : RigidTransform
+        The tool held: TCP in the world and on the flange. An external TCP: the gun, and the target on the flange.
+    external : Array
+        External axes, shape (6,) or (n, 6); NaN where the target does not give them.
+    """
+
+    tool2world: RigidTransform
+    tool2flange: RigidTransform
+    external: Array
+
+
+def chain_of(cell: RobotCell, move: Move, target: Target, target2base: RigidTransform) -> Chain | Reason:
+    """Chain of a motion to ``target`` lying at ``target2base``, or what is not known of it.
+
+    KUKA's #TCP: $BASE is the gun in the world, $TOOL the part on the flange (facts: krl.md 5). ABB: the gun is the
+    tool, the part the work object (rapid.md 2.4).
+    """
+    for frame, code in ((move.tool, "UNKNOWN_TOOL"), (move.base, "UNKNOWN_FRAME")):
+        if frame is None or frame.pose is None:
+            what = "the tool" if code == "UNKNOWN_TOOL" else "the base"
+            return Reason(code, f"{what}: {'the program does not tell it' if frame is None else frame.unknown}")
+    assert move.tool is not None and move.base is not None  # noqa: S101 - just seen
+    tool, base = move.tool.pose, move.base.pose
+    assert tool is not None and base is not None  # noqa: S101
+    external = external_axes(cell, target)
+    if cell.on_track and (cell.track is None or not np.isfinite(external[cell.track.axis])):
+        return Reason("CONFIG_NOT_CHECKED", "the robot stands on an external axis: where its base is, is not known")
+    if not move.external_tcp:
+        return Chain(base * target2base, tool, external)
+    gun, part = (tool, base) if move.base.held else (base, tool)
+    return Chain(gun, part * target2base, external)
+
+
+def external_axes(cell: RobotCell, target: Target) -> Array:
+    """External axes of a target, shape (6,), NaN where it does not give them."""
+    numbers = [target.number(name) for name in EXTERNAL[cell.language]]
+    return np.array([np.nan if number is None or abs(number) > _UNUSED else number for number in numbers])
+
+
+def stacked(chains: Sequence[Chain]) -> Chain:
+    """Return one chain of n motions, n > 0."""
+    world, tool = (
+        RigidTransform.from_matrix(np.stack([getattr(chain, name).as_matrix() for chain in chains]))
+        for name in ("tool2world", "tool2flange")
+    )
+    return Chain(world, tool, np.stack([chain.external for chain in chains]))
+
+
+def standing(cell: RobotCell, chain: Chain) -> RobotCell:
+    """Cell with its foot where the chain's external axes put it."""
+    return cell.at(chain.external) if cell.on_track else cell
