@@ -76,7 +76,8 @@ class NumberStyle:
     def at_least(self, decimals: int) -> NumberStyle:
         """Style for a changed number: the source's decimals, but never fewer than asked for and without exponent."""
         own = self.decimals - int(self.exponent[1:] or 0) if self.exponent else self.decimals
-        return NumberStyle(min(max(own, decimals), max(MOST_DECIMALS, decimals)))
+        count = min(max(own, decimals), max(MOST_DECIMALS, decimals))
+        return NumberStyle(count, point=count > 0)
 
     @property
     def half_digit(self) -> float:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from respot.kinematics.cell import RobotCell
-from respot.kinematics.path import check_path, check_travel, singularity_distances, travel
+from respot.kinematics.path import check_path, check_travel, made_worse, singularity_distances, travel
 from respot.kinematics.robots import find_robot
 
 LIMITS = np.array([[-185, 185], [-140, -5], [-120, 155], [-350, 350], [-125, 125], [-350, 350.0]])
@@ -75,3 +75,20 @@ def test_travel_changes_by_more_than_a_half_turn():
     assert "axis 4" in check_travel(before, after)[0].message
     assert check_travel(before, before) == []
     assert check_travel([GOOD], [GOOD]) == []
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "worse"),
+    [
+        (184.5, 184.5, []),
+        (184.5, 184.45, []),
+        (184.3, 184.5, ["NEAR_LIMIT"]),
+        (184.5, 184.3, []),
+        (180.0, 184.5, ["NEAR_LIMIT"]),
+        (185.5, 184.5, []),
+        (184.5, 185.5, ["OUT_OF_LIMITS"]),
+    ],
+)
+def test_only_what_got_worse_is_worth_a_word(before, after, worse):
+    old, new = (check_path(CELL, [[a1, *GOOD[1:]]]) for a1 in (before, after))
+    assert [finding.code for finding in made_worse(old, new)] == worse

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from itertools import pairwise
 
@@ -242,9 +242,12 @@ def _configure(
         if not result.code:
             found[id(item)] = result.values
         elif not (options.keep_config and result.code in _KEPT):
-            hint = "; --keep-config keeps the old values" if result.code in _KEPT else ""
-            refused += _refusals(item, result.code, f"{result.message}{hint}")
+            refused += _refusals(item, result.code, f"{result.message}{_hint(result.code)}")
     return found
+
+
+def _hint(code: str) -> str:
+    return "; --keep-config keeps the old values" if code in _KEPT else ""
 
 
 def _preflight(
@@ -257,7 +260,7 @@ def _preflight(
         checked = flight.check({id(item.target) for item in moving if not kept(item.programs, item.target.name)})
         known = {(refusal.program, refusal.target, refusal.code) for refusal in refused}
         found = [
-            refusal
+            replace(refusal, message=f"{refusal.message}{_hint(refusal.code)}")
             for refusal in checked.refusals
             if (refusal.program, refusal.target, refusal.code) not in known
             and not (options.keep_config and refusal.code in _KEPT)

@@ -12,10 +12,10 @@ from respot.correction.chain import Chain, chain_of, stacked, standing
 from respot.correction.points import new_offset
 from respot.geometry import Array
 from respot.kinematics.cell import Reason, RobotCell
-from respot.kinematics.configuration import all_solutions, nearest_solution, taught_joints
+from respot.kinematics.configuration import all_solutions, nearest_inside, taught_joints
 from respot.kinematics.opw import OpwRobot
 from respot.languages import Language
-from respot.program.moves import Move
+from respot.program.moves import Motion, Move
 from respot.program.robot import Routine
 from respot.program.targets import Target, TargetKind
 
@@ -111,15 +111,18 @@ class Places:
                 continue
             moves = id(place.target) in moved
             last = (before[row - 1], after[row - 1]) if row else (_UNKNOWN, _UNKNOWN)
-            before[row] = self._near(place.before, place.taught if place.configured else last[0])
+            free = move.motion is Motion.JOINT and not place.configured
+            before[row] = self._near(place.before, place.taught if place.configured else last[0], free)
             start = before[row] if place.configured else last[1]
-            after[row] = self._near(place.after if moves else place.before, start)
+            after[row] = self._near(place.after if moves else place.before, start, free)
         return before, after
 
-    def _near(self, branches: Array, near: Array) -> Array:
+    def _near(self, branches: Array, near: Array, free: bool) -> Array:
+        """Solution nearest to ``near``; a motion that is ``free`` to choose takes one inside the limits."""
         if not np.isfinite(near).all():
             return _UNKNOWN
-        return np.asarray(nearest_solution(self._model, branches[None], near[None])[0])
+        limits = self._model.limits_deg if free else None
+        return np.asarray(nearest_inside(self._model, branches[None], near[None], limits)[0])
 
     def _posed(self, routine: Routine) -> Iterator[_Posed]:
         """Motions of a routine to poses that the program tells, in order."""
@@ -158,7 +161,11 @@ class Places:
         """Solve all motions at once."""
         solvable: list[tuple[_Posed, Sequence[Chain]]] = []
         for item in posed:
-            chains = [chain_of(self._cell, item.move, item.target, p) for p in (item.own, item.before, item.after)]
+            first = chain_of(self._cell, item.move, item.target, item.own)
+            chains = [
+                first if pose is item.own else chain_of(self._cell, item.move, item.target, pose)
+                for pose in (item.own, item.before, item.after)
+            ]
             known = [chain for chain in chains if isinstance(chain, Chain)]
             if len(known) == len(chains):
                 solvable.append((item, known))

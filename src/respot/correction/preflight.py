@@ -27,9 +27,9 @@ from respot.program.robot import Robot
 from respot.program.targets import TargetKind
 
 _WHAT = {
-    "NEAR_SINGULARITY": "motions come nearer to a singularity than before the correction",
-    "BRANCH_CHANGE": "motions change the branch of the arm, which they did not before the correction",
-    "NEAR_LIMIT": "motions come nearer to a software limit than before the correction",
+    "NEAR_SINGULARITY": "nearer to a singularity than before the correction",
+    "BRANCH_CHANGE": "the branch of the arm changes, which it did not before the correction",
+    "NEAR_LIMIT": "nearer to a software limit than before the correction",
 }
 
 
@@ -161,6 +161,7 @@ def _grouped(findings: Sequence[tuple[Move, Finding]]) -> list[Issue]:
         move, finding = min(group, key=lambda item: item[1].room)
         goal = move.target or f"{move.instruction}@{move.line}"
         joints = move.target is not None and move.target.kind is TargetKind.JOINTS
-        text = f"{program}: {len(group)} {_WHAT[code]}; the worst: {goal}{' (joints)' if joints else ''}, "
-        issues.append(Issue(code, f"{text}{finding.message}", move.path, move.line))
+        count = "1 motion" if len(group) == 1 else f"{len(group)} motions, the worst"
+        text = f"{program}: {_WHAT[code]}: {count} to {goal}{' (joints)' if joints else ''}: {finding.message}"
+        issues.append(Issue(code, text, move.path, move.line))
     return issues

@@ -253,6 +253,22 @@ def nearest_solution(model: OpwRobot, branches: Array, old_joints: Array) -> Arr
     return np.asarray(turned[np.arange(len(best)), best])
 
 
+def nearest_inside(model: OpwRobot, branches: Array, old_joints: Array, limits: Array | None) -> Array:
+    """As `nearest_solution`, but a solution inside the limits goes before a nearer one outside."""
+    if limits is None:
+        return nearest_solution(model, branches, old_joints)
+    turned = nearest_turn(branches, old_joints[:, None, :], model.revolute)
+    turned = np.where(turned > limits[:, 1], turned - 360.0 * model.revolute, turned)
+    turned = np.where(turned < limits[:, 0], turned + 360.0 * model.revolute, turned)
+    allowed = (outside(turned, limits) == 0.0).all(axis=-1)
+    inside = np.where(allowed[..., None], turned, np.nan)
+    travel = np.linalg.norm(inside - old_joints[:, None, :], axis=-1)
+    best = np.argmin(np.where(np.isfinite(travel), travel, np.inf), axis=1)
+    found = inside[np.arange(len(best)), best]
+    any_inside = allowed.any(axis=1)[:, None]
+    return np.asarray(np.where(any_inside, found, nearest_solution(model, branches, old_joints)))
+
+
 def _unreached(
     cell: RobotCell, model: OpwRobot, tool2world: RigidTransform, tool2flange: RigidTransform, row: int
 ) -> Reason:

@@ -92,10 +92,10 @@ def check_travel(before: npt.ArrayLike, after: npt.ArrayLike) -> list[Finding]:
 
 def made_worse(before: Iterable[Finding], after: Iterable[Finding]) -> list[Finding]:
     """Findings that a correction brought, or made clearly worse; same rows."""
-    known = {(finding.code, finding.row, finding.subject): finding.room for finding in before}
+    known = {(finding.row, finding.subject): finding.room for finding in before}
     worse = []
     for finding in after:
-        room = known.get((finding.code, finding.row, finding.subject))
+        room = known.get((finding.row, finding.subject))
         if room is None or room - finding.room > WORSE:
             worse.append(finding)
     return worse
