@@ -13,9 +13,13 @@ from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import accumulate
 
 #: A line end of any kind met in controller backups; RobotStudio 5.08 wrote 0D 0D 0A (facts: rapid.md 4.2).
 NEWLINE = re.compile(r"\r*\n|\r")
+
+#: A line with its end; what stands behind the last line end is none.
+_LINE = re.compile(r"[^\r\n]*(?:\r*\n|\r)")
 
 Span = tuple[int, int]
 
@@ -59,7 +63,7 @@ class SourceText:
     @cached_property
     def line_starts(self) -> list[int]:
         """Offset of the first character of every line."""
-        return [0, *(match.end() for match in NEWLINE.finditer(self.text))]
+        return [0, *accumulate(map(len, _LINE.findall(self.text)))]
 
     def place(self, offset: int) -> tuple[int, int]:
         """Line and column of an offset, counted from 1."""
