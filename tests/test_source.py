@@ -38,7 +38,9 @@ def test_places_count_every_kind_of_line_end():
     assert SourceText("x", b"a\r\nb\r\nc\n").newline == "\r\n"
 
 
-@given(st.text(max_size=40), st.lists(st.tuples(st.integers(0, 40), st.integers(0, 5), st.text(max_size=4)), max_size=5))
+@given(
+    st.text(max_size=40), st.lists(st.tuples(st.integers(0, 40), st.integers(0, 5), st.text(max_size=4)), max_size=5)
+)
 def test_edits_apply_in_any_order(text, wanted):
     edits, end = [], 0
     for start, length, replacement in sorted(wanted):

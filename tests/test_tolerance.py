@@ -34,6 +34,8 @@ def test_a_changed_number_is_near_to_half_its_last_digit(value, decimals):
         ("2.80000E+06", 3, 2800001.5, "2800001.500"),
         ("0.0", 3, -0.0001, "0.000"),  # no -0.000
         (".5", 4, 0.25, "0.2500"),
+        ("18", 0, 19.0, "19"),  # status, turn and confdata stay integers
+        ("-1", 0, 0.0, "0"),
     ],
 )
 def test_style_of_a_changed_number(text, at_least, value, wanted):

@@ -62,7 +62,10 @@ def test_every_target_in_scope_is_the_transform_of_the_old_one(robot, converted)
         unit = np.radians(1.0) if robot.name == "kuka" else 2.0
         assert np.abs(made[:3, :3] - wanted[:3, :3]).max() <= 3 * unit * max(half[3:]), name
         assert min(decimals[:3]) >= 3 and min(decimals[3:]) >= (4 if robot.name == "kuka" else 7)
-        assert all(new_count >= len(text.partition(".")[2]) for new_count, text in zip(decimals, old[name].numbers, strict=True))
+        assert all(
+            new_count >= len(text.partition(".")[2])
+            for new_count, text in zip(decimals, old[name].numbers, strict=True)
+        )
         assert new[name].rest == old[name].rest  # external axes
 
 
@@ -118,6 +121,31 @@ def test_only_numbers_of_moved_targets_and_the_header_change(robot, converted):
                 assert before == after
             else:
                 assert re.sub(NUMBER, "#", before) == re.sub(NUMBER, "#", after)
+
+
+def test_configurations_stay_integers_and_those_that_must_change_do(robot, converted):
+    """The shift carries axis 1 of a few spots across zero: stale numbers would unwind the gun arm."""
+    folder, _ = converted
+    pattern = {"kuka": r"X(\w+)=\{[^}]*,S ([^,]+),T ([^,]+),", "abb": r"(\w+):=\[\[[^]]*\],\[[^]]*\],\[([^]]*)\]()"}[
+        robot.name
+    ]
+    old, new = {}, {}
+    for found, root in ((old, robot.root), (new, folder)):
+        for path in root.rglob("*"):
+            if path.suffix in (".dat", ".mod") and path.stem in robot.welding:
+                for name, *numbers in re.findall(pattern, path.read_bytes().decode(robot.encoding)):
+                    found[path.stem, name] = numbers
+    assert old.keys() == new.keys()
+    for numbers in new.values():
+        assert all(re.fullmatch(r"-?\d+", number) for text in numbers if text for number in text.split(","))
+    changed = {name for name in old if old[name] != new[name]}
+    assert (
+        changed
+        == {
+            "kuka": {("rear_door_u", "P40"), ("rear_door_u", "P02WP1615438")},
+            "abb": {("RearDoor", "P02WP1615434")},
+        }[robot.name]
+    )
 
 
 def test_home_dresser_and_gun_stay(robot, converted):

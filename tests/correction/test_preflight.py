@@ -213,6 +213,14 @@ def test_a_robot_that_does_not_reach_the_taught_point_is_another_robot(convert):
     assert "XP1" in kept.edited()
 
 
+def test_what_was_not_checked_is_said(convert):
+    data = point("P1", GOOD).replace("TOOL_NO 1", "TOOL_NO 7")
+    done = convert({**program(small.lin("P1"), data), **machine()}, a1=1.0)
+    assert done.code == 0, done.err
+    (message,) = (text for text in said(done, "NOT_CHECKED") if "reach" in text)
+    assert "the motion to XP1" in message and "TOOL_DATA[7]" in message
+
+
 # -------------------------------------------------------------------------------------------------------- joint travel
 
 

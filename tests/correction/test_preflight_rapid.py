@@ -114,6 +114,17 @@ def test_an_offset_pose_must_be_in_reach(convert, push, code):  # noqa: F811
     assert done.refusals() == ({("Weld", "S1", "OUT_OF_REACH")} if code else set())
 
 
+def test_joint_positions_are_part_of_the_path(convert):  # noqa: F811
+    """Axis 5 goes from 0.2 to below 0: its sign changes on the way there and on the way to the joint position."""
+    data = f"  CONST robtarget P1:={robtarget((35, 15, 10, 0, 0.2, 0), (0, 0, 0, 0))};\n"
+    data += "  CONST jointtarget jPark:=[[35,15,10,10,40,10],[9E9,9E9,9E9,9E9,9E9,9E9]];\n"
+    body = "    MoveJ P1,v800,z10,tGun\\WObj:=wFloor;\n    MoveAbsJ jPark,v800,z10,tGun\\WObj:=wFloor;\n"
+    done = convert(rapid(body, data), shift=(0, 0, -20))
+    assert done.code == 0, done.err
+    (message,) = said(done, "BRANCH_CHANGE")
+    assert "2 motions" in message and conf_of(done, "P1")[3] == 1
+
+
 # --------------------------------------------------------------------------------------------------------------- chain
 
 

@@ -142,7 +142,8 @@ class Preflight:
         if not left:
             return []
         move, reason = left[0]
-        message = f"reach, limits and joint travel of {len(left)} motions, first {move.target}: {reason}"
+        count = "the motion" if len(left) == 1 else f"{len(left)} motions, the first"
+        message = f"reach, limits and joint travel of {count} to {move.target}: {reason}"
         return [Issue("NOT_CHECKED", message, move.path, move.line)]
 
 
