@@ -75,7 +75,7 @@ def _rich(columns: Sequence[Column], rows: Sequence[Sequence[str]], marked: Sequ
 
     made = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for column in columns:
-        made.add_column(column.title, justify="right" if column.number else "left", no_wrap=True)
+        made.add_column(Text(column.title), justify="right" if column.number else "left", no_wrap=True)
     for index, row in enumerate(rows):
         style = "yellow" if index < len(marked) and marked[index] else ""
         made.add_row(*(Text(printable(cell), style=style) for cell in row))
