@@ -127,3 +127,11 @@ def test_plain_text_when_piped(respot, backup, theory):
     assert "14 of 14 spots within 10 mm after" in result.out
     assert "0.5 / 4.9 / 1.7 mm in x / y / z" in result.out
     assert "swapped_ids (named)" in result.out
+
+
+def test_a_digit_too_many_is_an_outlier_not_a_line(respot, backup, theory, tmp_path):
+    (tmp_path / "typo.csv").write_text(theory.read_text().replace("4306.86", "4306860.0"))
+    found = respot("fit", backup, "--theory", "typo.csv", "--json").json
+    assert [spot["id"] for spot in found["spots"] if not spot["inlier"]] == ["P02WP1615434"]
+    assert found["n_inliers"] == 13
+    assert found["after"]["max"] < 10.5

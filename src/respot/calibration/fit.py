@@ -198,7 +198,7 @@ def fit_spots(
     """
     names = tuple(str(name) for name in ids)
     first, second = _check(names, source, reference)
-    before = fit_rigid(first, second)
+    before = fit_rigid(first, second, checked=False)
     exchanged = find_exchanged(names, first, second, seed=seed)
     robust, repaired = exchanged.robust, second[exchanged.permutation]
     inliers = robust.inliers

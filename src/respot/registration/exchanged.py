@@ -12,7 +12,7 @@ of freedom times the robust scale, widened by each member's leverage):
 2. with the names repaired, every member meets its place within t, or (noise is rarely the same along all axes) within
    2 t and a quarter of what it missed as named;
 3. the RMS over the members falls to `GAIN` or less of what it was;
-4. the leave-one-out RMS of the whole table (least squares, all pairs) falls;
+4. the leave-one-out RMS of the members and all that agree with the model (least squares) falls;
 5. at least `WITNESSES` other inliers, not on a line, are left to judge by.
 
 Spots nearer to each other than t cannot be told apart, and are left as they are named.
@@ -55,7 +55,7 @@ class Exchange:
     rows : tuple of int
         Their rows in the table of pairs.
     loo_before, loo_after : float
-        Leave-one-out RMS of the whole table [mm]: every other accepted cycle repaired, this one as named and repaired.
+        Leave-one-out RMS of the members and all that agree with the model [mm]: every other accepted cycle repaired, this one as named and repaired.
     members_before, members_after : float
         RMS over the members, held out together, as named and repaired [mm].
     worst_before, worst_after : float
@@ -204,11 +204,13 @@ def _try(source: Array, reference: Array, robust: RobustFit, cycle: Rows) -> _Tr
     predicted = held_out.predict(source[cycle])
     repaired = reference.copy()
     repaired[cycle] = reference[places]
+    judged = witnesses.copy()  # another wrong spot, perhaps a kilometre off, says nothing about this cycle
+    judged[cycle] = True
     return _Trial(
         before=np.linalg.norm(predicted - reference[cycle], axis=1),
         after=np.linalg.norm(predicted - reference[places], axis=1),
-        loo_before=rms(leave_one_out(source, reference)),
-        loo_after=rms(leave_one_out(source, repaired)),
+        loo_before=rms(leave_one_out(source[judged], reference[judged])),
+        loo_after=rms(leave_one_out(source[judged], repaired[judged])),
     )
 
 

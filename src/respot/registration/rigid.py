@@ -142,7 +142,9 @@ def transform_of(source: Array, reference: Array, weights: Array | None = None) 
     return rotations, reference_mean - np.einsum("...ij,...j->...i", rotations, source_mean)
 
 
-def fit_rigid(source: ArrayLike, reference: ArrayLike, weights: ArrayLike | None = None) -> RigidFit:
+def fit_rigid(
+    source: ArrayLike, reference: ArrayLike, weights: ArrayLike | None = None, *, checked: bool = True
+) -> RigidFit:
     """Least-squares rigid transform of paired points (Umeyama 1991, eq. 40 and 41, scale 1).
 
     Parameters
@@ -151,6 +153,9 @@ def fit_rigid(source: ArrayLike, reference: ArrayLike, weights: ArrayLike | None
         Paired points in their own frames [mm].
     weights : (n,) array, optional
         Non-negative weight of each pair; pairs of weight 0 take no part and still get a residual.
+    checked : bool
+        Refuse degenerate pairs. Unchecked where wrong pairs are still among them: one spot a kilometre off, by a digit
+        too many, makes the others look like a point.
 
     Raises
     ------
@@ -167,14 +172,15 @@ def fit_rigid(source: ArrayLike, reference: ArrayLike, weights: ArrayLike | None
     if int(used.sum()) < 3:
         raise RegistrationError("TOO_FEW_PAIRS", f"{int(used.sum())} pairs take part, at least 3 are needed")
     spread = _principal_spread(first, share)
-    _require_plane(spread, "source")
-    _require_plane(_principal_spread(second, share), "reference")
+    if checked:
+        _require_plane(spread, "source")
+        _require_plane(_principal_spread(second, share), "reference")
 
     share = share / share.sum()
     source_mean, reference_mean = share @ first, share @ second
     covariance = ((first - source_mean) * share[:, None]).T @ (second - reference_mean)
     rotation, values, sign = rotations_from_covariance(covariance)
-    if values[1] + sign * values[2] <= COLLINEAR_TOLERANCE**2 * values[0]:
+    if checked and values[1] + sign * values[2] <= COLLINEAR_TOLERANCE**2 * values[0]:
         raise DegenerateError(
             "source and reference do not correspond along more than one direction: "
             "the rotation about that direction is not determined"

@@ -86,7 +86,7 @@ def fit_robust(source: ArrayLike, reference: ArrayLike, *, seed: int = 0) -> Rob
         All pairs, or the inliers, lie on a line.
     """
     first, second = check_pairs(source, reference, minimum=4)
-    plain = fit_rigid(first, second)
+    plain = fit_rigid(first, second, checked=False)
     step = max(1, -(-len(first) // _SAMPLE))
     sample, target = first[::step], second[::step]
 
@@ -104,7 +104,7 @@ def fit_robust(source: ArrayLike, reference: ArrayLike, *, seed: int = 0) -> Rob
     except DegenerateError as error:
         raise DegenerateError(f"of the {int(inliers.sum())} pairs that agree with each other, {error}") from error
     except RegistrationError:
-        inliers, rigid, start = np.ones(len(first), dtype=bool), plain, "least-squares"
+        inliers, rigid, start = np.ones(len(first), dtype=bool), fit_rigid(first, second), "least-squares"
     lengths = np.linalg.norm(rigid.residuals, axis=1)
     return RobustFit(rigid, inliers, _tukey(lengths / scale), scale, INLIER_CHI * scale, start)
 
