@@ -55,7 +55,8 @@ class Exchange:
     rows : tuple of int
         Their rows in the table of pairs.
     loo_before, loo_after : float
-        Leave-one-out RMS of the members and all that agree with the model [mm]: every other accepted cycle repaired, this one as named and repaired.
+        Leave-one-out RMS of the members and all that agree with the model [mm]: every other accepted cycle repaired,
+        this one as named and repaired.
     members_before, members_after : float
         RMS over the members, held out together, as named and repaired [mm].
     worst_before, worst_after : float
