@@ -6,6 +6,7 @@ intended, and renamed in one step. An interrupt or an error leaves no half-writt
 
 from __future__ import annotations
 
+import hashlib
 import json
 import shutil
 import tempfile
@@ -35,9 +36,26 @@ def check_output(folder: Path, force: bool, inputs: Sequence[Path] = ()) -> None
     if folder.is_dir() and any(folder.iterdir()) and not force:
         message = "exists and is not empty; name another one with -o, or replace it with --force"
         raise BadInputError("OUTPUT_EXISTS", message, str(folder))
-    if folder.is_dir() and any(folder.iterdir()) and not (folder / RECORD).is_file():
-        message = f"holds no {RECORD}: --force replaces only what respot wrote; name another folder with -o"
-        raise BadInputError("OUTPUT_EXISTS", message, str(folder))
+    if folder.is_dir() and any(folder.iterdir()):
+        strange = _not_ours(folder)
+        if strange:
+            message = f"{strange}: --force replaces only what respot wrote; name another folder with -o"
+            raise BadInputError("OUTPUT_EXISTS", message, str(folder))
+
+
+def _not_ours(folder: Path) -> str:
+    """Say what a folder holds that its record does not know, or knows otherwise; empty if there is nothing."""
+    try:
+        contents = json.loads((folder / RECORD).read_bytes()).get("contents", {})
+    except (OSError, ValueError, AttributeError):
+        return f"holds no {RECORD}"
+    for path in sorted(folder.rglob("*")):
+        name = path.relative_to(folder).as_posix()
+        if path.is_dir() or name == RECORD:
+            continue
+        if not isinstance(contents, dict) or contents.get(name) != hashlib.sha256(path.read_bytes()).hexdigest():
+            return f"holds {name}, which respot did not write, or not so"
+    return ""
 
 
 def _within(source: Path, folder: Path) -> bool:
@@ -97,7 +115,8 @@ def write_backup(
         written = {path: (staging / path).read_bytes() for path in files}
         prove(correction, files, written)
         text = json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-        (staging / RECORD).write_text(text, encoding="utf-8", newline="\n")
+        # bytes of a file name that are no UTF-8 become escapes, as JSON spells them
+        (staging / RECORD).write_bytes(text.encode("utf-8", "backslashreplace"))
         _move(staging, folder)
     except OSError as error:
         raise BadInputError("CANNOT_READ", f"cannot be written: {error.strerror}", str(folder)) from error

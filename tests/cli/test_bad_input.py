@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import signal
 import socket
@@ -131,6 +132,27 @@ def test_force_replaces_what_respot_wrote(respot, tmp_path, theory):
     assert respot("convert", SAMPLES / "abb", "--theory", theory, "-o", "done", "--force").code == 0
     assert not (tmp_path / "done" / "KRC").exists()
     assert (tmp_path / "done" / "RAPID").is_dir()
+
+
+@pytest.mark.parametrize("change", ["notes.txt", "RAPID/TASK1/PROGMOD/RearDoor.mod"])
+def test_force_keeps_what_a_person_added_or_changed(respot, tmp_path, theory, change):
+    assert respot("convert", SAMPLES / "abb", "--theory", theory, "-o", "done").code == 0
+    (tmp_path / "done" / change).write_text("mine")
+    result = respot("convert", SAMPLES / "abb", "--theory", theory, "-o", "done", "--force")
+    refused(result, tmp_path, "OUTPUT_EXISTS", change.rpartition("/")[2])
+    assert (tmp_path / "done" / change).read_text() == "mine"
+
+
+def test_a_file_name_that_is_no_utf_8(respot, tmp_path, theory):
+    shutil.copytree(SAMPLES / "kuka", tmp_path / "kuka")
+    raw = os.fsencode(tmp_path / "kuka" / "KRC" / "R1" / "Program") + b"/\xfcbung.src"
+    with open(raw, "wb") as file:  # noqa: PTH123
+        file.write(b"DEF uebung( )\r\nLINN X\r\nEND\r\n")
+    assert respot("check", "kuka").code == 0
+    result = respot("convert", "kuka", "--theory", theory, "-o", "out", "--json")
+    assert result.code == 0, result.err
+    copied = os.fsencode(tmp_path / "out" / "KRC" / "R1" / "Program") + b"/\xfcbung.src"
+    assert os.path.exists(copied)  # noqa: PTH110
 
 
 @pytest.mark.parametrize("moment", ["before", "after"])

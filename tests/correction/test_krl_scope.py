@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import re
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from respot.cli import app
 from tests.correction.small import SPOTS, convert, convert_again, fdat, krl, krl_in_base1, krl_point, lin, moved
 
 NUMBERS = re.compile(r"[XYZ] (-?[\d.]+)")
@@ -333,6 +336,9 @@ def test_a_base_that_the_program_changes_is_not_known(tmp_path, code):
         ("SET_BASE2( )\nLIN XP8\n", "UNKNOWN_FRAME"),
         ("TRIGGER WHEN DISTANCE=0 DELAY=0 DO SB()\nLIN XP8\n", "UNKNOWN_FRAME"),
         ("LIN XP8 C_FOO BAR\n", "OPAQUE_STATEMENT"),
+        ('CREAD(H,SW,MR,TO,OFS,"%f",XP8.Z)\n' + lin("P8"), "RUN_TIME_POSE"),
+        ("TRIGGER WHEN DISTANCE=0 DELAY=0 DO XP8.Z=XP8.Z+300\n" + lin("P8"), "RUN_TIME_POSE"),
+        ("TRIGGER WHEN DISTANCE=0 DELAY=0 DO $BASE=UNKNOWN\nLIN XP8\n", "UNKNOWN_FRAME"),
         (lin("P8", "XS1:XP8"), "RUN_TIME_POSE"),
         (lin("P8", "{X 0,Y 0,Z 50,A 0,B 0,C 0}:XP8"), "RUN_TIME_POSE"),
         (lin("P8", "$NULLFRAME:XP8"), "RUN_TIME_POSE"),
@@ -441,3 +447,35 @@ def test_a_program_that_comes_without_its_config_goes_home_all_the_same(tmp_path
     assert convert(tmp_path, files).code == 0
     elsewhere = krl(body="PTP XAWAY\n")
     assert convert(tmp_path / "away", elsewhere).refusals() == {("weld", "PTP@19", "RUN_TIME_POSE")}
+
+
+def test_a_dresser_under_a_base_that_nobody_set_stays(tmp_path):
+    """Spots in the world frame; an unset base lies in the world too, but the dresser is no part."""
+    files = {path: text.replace("BASE_NO 1", "BASE_NO 0") for path, text in krl(body="kappen( )\n").items()}
+    files["KRC/R1/Program/kappen.src"] = "DEF kappen( )\n" + lin("P8") + "END\n"
+    files["KRC/R1/Program/kappen.dat"] = "DEFDAT KAPPEN\n" + krl_point("P8", 5, 6, 7) + fdat("P8", base=2) + "ENDDAT\n"
+    done = convert(tmp_path, files)
+    assert done.code == 0, done.err
+    assert "XS1" in done.edited()
+    assert "XP8" not in done.edited()
+
+
+def test_a_weld_behind_another_routines_motion_is_nobodys(tmp_path):
+    more = {"appr.src": "DEF appr( )\n" + lin("P9") + "END\n"}
+    more["appr.dat"] = "DEFDAT APPR\n" + krl_point("P9", 1, 2, 3) + fdat("P9") + "ENDDAT\n"
+    files = krl(body=lin("P8") + "appr( )\nUSERSPOT(#SPOT,S_ACT)\n", data=P8, more=more)
+    convert(tmp_path, files)
+    record = json.loads(CliRunner().invoke(app, ["inspect", str(tmp_path / "backup"), "--json"]).stdout)
+    assert {t["name"] for t in record["robots"][0]["targets"] if t["weld"]} == {"XS1", "XS2", "XS3", "XS4"}
+
+
+def test_routines_that_call_each_other_many_times_are_followed_in_bounded_time(tmp_path):
+    more = {f"m{n}.src": f"DEF m{n}( )\n" + f"m{n + 1}( )\n" * 12 + "END\n" for n in range(1, 9)}
+    more["m9.src"] = "DEF m9( )\nEND\n"
+    assert convert(tmp_path, krl(body="m1( )\n", more=more)).code == 0
+
+
+def test_a_kept_target_of_a_partial_correction_makes_transitions(tmp_path):
+    data = krl_point("P8", 5, 6, 7, ",S 2,T 2") + fdat("P8") + krl_point("P9", 1, 2, 3) + fdat("P9")
+    done = convert(tmp_path, krl(body=lin("P8") + lin("P9"), data=data), "--partial")
+    assert {("XS4", "XP8"), ("XP8", "XP9")} <= {(t["from"], t["to"]) for t in done.record["transitions"]}

@@ -333,3 +333,14 @@ def test_a_fragment_without_a_module_is_not_corrected_twice(tmp_path):
 
 def test_joints_that_are_declared_elsewhere_do_not_refuse_a_program(tmp_path):
     assert run(tmp_path, rapid(body="    MoveAbsJ jHome\\NoEOffs,v100,fine,tGun;\n")).code == 0
+
+
+@pytest.mark.parametrize(
+    "code", ["SearchL\\Stop,di1,p1,S1,v100,tGun\\WObj:=wDoor;", "ok:=StrToVal(st,p1);", "Move1\\p:=p1;"]
+)
+def test_what_writes_into_a_target_makes_it_a_run_time_pose(tmp_path, code):
+    routine = "  PROC Move1(\\INOUT robtarget p)\n    p.trans.z:=5;\n  ENDPROC\n"
+    data = P1.replace("CONST", "PERS")
+    done = run(tmp_path, rapid(body=f"    {code}\n" + MOVE, data=data, after=routine))
+    assert "p1" not in done.edited()
+    assert "RUN_TIME_POSE" in {found for _, _, found in done.refusals()}

@@ -196,6 +196,7 @@ def record_of(conversion: Conversion) -> dict[str, Any]:
         "verified": True,
         "applied": [*_applied(conversion.source), conversion.calibration.content_hash],
         "issues": [issue.as_json() for issue in conversion.issues],
+        "contents": {path: _sha256(correction.files.get(path, data)) for path, data in files.items()},
         "files": {
             path: {"before": _sha256(files[path]), "after": _sha256(data)} for path, data in correction.files.items()
         },

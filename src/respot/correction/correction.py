@@ -152,7 +152,9 @@ def align(
         edits=edits,
         refused=refused,
         refused_programs=refused_programs,
-        transitions=_transitions(robot, scope, {id(item.target) for item in moving}, refused_programs),
+        transitions=_transitions(
+            robot, scope, {id(i.target) for i in moving if not kept(i.programs, i.target.name)}, refused_programs
+        ),
         files=_changed_files(robot, language, options, edits, header),
         reconfigured=all(id(item) in configured for item in moving if language.has_configuration(item.target)),
         issues=[*_issues(robot, cell, scope, moving, spot_moves, edits), *checked.issues],

@@ -159,7 +159,7 @@ class _Finder:
             return False
         if move.base is None or not self._is_matched(move.base, routine.task):
             return False
-        return not (move.base.world and self._is_service(routine))
+        return not (_is_world(move.base) and self._is_service(routine))
 
     def _is_matched(self, base: Frame, task: str) -> bool:
         """Whether a matched spot of the task uses the base, under this or another name."""
@@ -183,7 +183,7 @@ class _Finder:
         if move.base.pose is None:
             return refuse("UNKNOWN_FRAME", f"base {move.base}: {move.base.unknown}")
         elsewhere = id(routine) not in self._core or self._is_service(routine)
-        if move.base.world and not self._is_matched(move.base, routine.task) and not elsewhere:
+        if _is_world(move.base) and not self._is_matched(move.base, routine.task) and not elsewhere:
             message = (
                 f"{move.routine} welds under other bases but goes to this target in the world frame: "
                 "respot cannot tell whether it belongs to the part"
@@ -225,6 +225,11 @@ class _Finder:
             scope.refusals.append(refusal)
             return
         scope.moving.append(Moving(target, base, everywhere))
+
+
+def _is_world(base: Frame) -> bool:
+    """Whether a base is the world, by number or because nobody ever set it."""
+    return base.world or (not base.held and _same(base, Frame("world", world=True)))
 
 
 def _same(first: Frame, second: Frame) -> bool:

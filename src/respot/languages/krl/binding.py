@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from respot.languages.krl.blocks import Routine as Block
 from respot.languages.krl.forms import FORMS
 from respot.languages.krl.machine import Frames, frame_pose
-from respot.languages.krl.run_time import MOTIONS, RunTime, called, touches_frames
+from respot.languages.krl.run_time import MOTIONS, RunTime, assignments, called, touches_frames
 from respot.languages.krl.symbols import Aggregate, Symbol, Symbols, module_key, value_of
 from respot.languages.krl.targets import POSITION_TYPES, Targets
 from respot.program.frames import Frame
@@ -234,9 +234,9 @@ class _Walk:
 
     def _step(self, statement: Statement) -> None:
         kind = statement.kind
-        if kind == "assignments":
+        if assignments(statement):
             self._run_calls(statement)
-            for assignment in statement.node.all("assignment"):
+            for assignment in assignments(statement):
                 self._assign(assignment)
         elif kind == "call":
             self._call(statement.node, statement.line)
@@ -350,6 +350,8 @@ class _Walk:
         """Mark the last motion, if no other routine was called since, as one that welds."""
         for index in range(len(self._steps) - 1, -1, -1):
             step = self._steps[index]
+            if isinstance(step, Call) and not self._binder.run_time.leaves_frames(step.name):
+                return  # that routine may have moved: where the gun welds is not known
             if isinstance(step, Move):
                 name = step.target.name if step.target is not None else ""
                 self._steps[index] = replace(step, weld=True, spot_ids=FORMS.spot_ids(name))

@@ -13,6 +13,8 @@ from respot.program.statement import OPAQUE, Node, Statement
 MOTIONS = frozenset(("motion", "relative_motion", "circular_motion"))
 _INDEXED = re.compile(r"(\w+)\[(\d+)\]")
 _FRAME_WORDS = re.compile(r"\$TOOL\b|\$BASE\b|FDAT_ACT|\bBAS\s*\(", re.IGNORECASE)
+#: Functions of the system that leave frames alone but write into their arguments.
+_WRITING = frozenset(("CREAD", "SREAD", "SWRITE", "CAST_FROM", "CAST_TO", "INVERSE", "FORWARD", "VARSTATE"))
 _FRAME_DATA = ("$TOOL", "$BASE", "$IPO_MODE", "FDAT_ACT")
 
 
@@ -24,6 +26,13 @@ def called(statement: Statement) -> Iterator[Node]:
                 yield node
 
 
+def assignments(statement: Statement) -> list[Node]:
+    """Return every assignment that a statement makes, also after DO; those of a WITH list hold for one motion only."""
+    if statement.kind not in ("assignments", "trigger", "interrupt_declaration"):
+        return []
+    return statement.node.all("assignment")
+
+
 def touches_frames(statement: Statement) -> bool:
     """Whether a statement sets tool or base itself, or might: nobody knows what an unread one does."""
     if statement.kind == OPAQUE:
@@ -32,8 +41,8 @@ def touches_frames(statement: Statement) -> bool:
         return False
     if statement.kind == "spline":
         return statement.node.first("with_") is not None
-    if statement.kind == "assignments":
-        return any(_left(node).startswith(_FRAME_DATA) for node in statement.node.all("assignment"))
+    if any(_left(node).startswith(_FRAME_DATA) for node in assignments(statement)):
+        return True
     return any(node.tokens("NAME")[0].text.upper() == "BAS" for node in called(statement))
 
 
@@ -83,7 +92,9 @@ class RunTime:
 def read_run_time(code: Mapping[str, Iterable[Block]]) -> RunTime:
     """Read what the routines change, by the module they stand in."""
     found = RunTime()
-    heads = {block.name.upper(): _directions(block) for blocks in code.values() for block in blocks}
+    heads: dict[str, list[list[str]]] = {}
+    for block in (block for blocks in code.values() for block in blocks):
+        heads.setdefault(block.name.upper(), []).append(_directions(block))
     found.routines = set(heads)
     calls: dict[str, set[str]] = {}
     for module, blocks in code.items():
@@ -102,19 +113,19 @@ def read_run_time(code: Mapping[str, Iterable[Block]]) -> RunTime:
 
 
 def _read_statement(
-    found: RunTime, statement: Statement, module: str, heads: Mapping[str, list[str]], calls: set[str]
+    found: RunTime, statement: Statement, module: str, heads: Mapping[str, list[list[str]]], calls: set[str]
 ) -> None:
-    if statement.kind == "assignments":
-        for assignment in statement.node.all("assignment"):
-            found.add(_left(assignment), module)
+    for assignment in assignments(statement):
+        found.add(_left(assignment), module)
     for node in called(statement):
         name = node.tokens("NAME")[0].text.upper()
         calls.add(name)
-        if FORMS.is_harmless(name):
+        if FORMS.is_harmless(name) and name not in _WRITING:
             continue
-        directions = heads.get(name, [])
+        known = heads.get(name, [])
         for index, argument in enumerate((node.first("arguments") or node).nodes):
-            outward = directions[index] != "IN" if index < len(directions) else name not in heads
+            # local routines of several modules may share a name: any of them may be meant
+            outward = not known or any(index >= len(directions) or directions[index] != "IN" for directions in known)
             if argument.kind == "reference" and outward:
                 found.add("".join(argument.text.split()).upper(), module)
 

@@ -96,6 +96,8 @@ class Binder:
         if not found and FORMS.welds(name, []):
             for index in range(len(steps) - 1, -1, -1):
                 step = steps[index]
+                if isinstance(step, Call) and step.name.lower() != name.lower():
+                    return  # that routine may have moved: where the gun welds is not known
                 if isinstance(step, Move):
                     steps[index] = replace(step, weld=True)
                     return

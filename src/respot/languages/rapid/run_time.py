@@ -10,6 +10,10 @@ from respot.languages.rapid.symbols import Module
 from respot.program.statement import Node, Statement
 
 _DISPLACING = frozenset(("pdispset", "pdispon"))
+#: Motions that write where they found something into their second argument.
+_SEARCHING = frozenset(("searchl", "searchc"))
+#: Instructions and functions of RobotWare that write into data they are given.
+_WRITING = frozenset(("strtoval", "unpackrawbytes", "readanybin", "readrawbytes", "getsysdata", "getdataval"))
 _BY_REFERENCE = frozenset(("INOUT", "VAR", "PERS"))
 
 
@@ -78,15 +82,40 @@ def _written(modules: Iterable[Module]) -> Iterator[str]:
                 if node.kind == "assignment":
                     yield node.nodes[0].nodes[0].text.lower()
                 elif node.kind in ("call", "function_call"):
-                    yield from _handed(node, heads.get(name_of(node).lower(), ()))
+                    name = name_of(node).lower()
+                    if name in heads:
+                        yield from _handed(node, heads[name])
+                    elif name in _SEARCHING:
+                        yield from _handed(node, (False, True))
+                    elif name in _WRITING:
+                        yield from _references(node)
+
+
+def _references(call: Node) -> Iterator[str]:
+    """Yield every datum that a call gets, whole or in part."""
+    arguments = call.first("arguments")
+    for node in () if arguments is None else arguments.walk():
+        if node.kind == "reference":
+            yield node.nodes[0].text.lower()
 
 
 def _handed(call: Node, by_reference: Sequence[bool]) -> Iterator[str]:
     arguments = call.first("arguments")
-    positional = [] if arguments is None else [node.nodes[0] for node in arguments.all("argument") if node.nodes]
-    for argument, changes in zip(positional, by_reference, strict=False):
-        if changes and argument.kind == "reference":
+    if arguments is None:
+        return
+    positional = [node.nodes[0] for node in arguments.all("argument") if node.nodes]
+    options = [node.nodes[0] for node in arguments.all("optional_argument", "named_argument") if node.nodes]
+    for argument, changes in [*zip(positional, by_reference, strict=False), *((node, True) for node in options)]:
+        if changes and argument.kind == "reference" and not _is_frame_option(argument, arguments):
             yield argument.nodes[0].text.lower()
+
+
+def _is_frame_option(argument: Node, arguments: Node) -> bool:
+    r"""Whether an argument is handed as ``\WObj``: a wrapper needs it PERS, and changes it only by assignment."""
+    for option in arguments.all("optional_argument"):
+        if option.nodes and option.nodes[0].span == argument.span:
+            return option.tokens("NAME")[0].text.lower() == "wobj"
+    return False
 
 
 def _by_reference(block: Block) -> list[bool]:
