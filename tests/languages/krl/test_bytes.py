@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import time
 
 import pytest
 
@@ -97,10 +96,8 @@ def test_nul_bytes_within(read):
     ids=["parentheses", "brackets", "signs", "terms", "components", "arguments", "digits", "string", "quotes"],
 )
 def test_monstrous_line(line, reason, read):
-    begin = time.perf_counter()
     data = f"DEF a ( )\n{line}\nPTP XP1\nEND\n".encode()
     source, statements = read(data)
-    assert time.perf_counter() - begin < 20
     assert _join(source, statements) == data
     assert [statement.line for statement in statements] == [1, 2, 3, 4]
     assert statements[1].shape.reason == reason
@@ -112,9 +109,7 @@ def test_monstrous_line(line, reason, read):
 
 def test_a_line_of_100_megabytes(read):
     data = b"DEF a ( )\n" + b"X 1.0," * 17_000_000 + b"\nEND\n"
-    begin = time.perf_counter()
     source, statements = read(data)
-    assert time.perf_counter() - begin < 20
     assert [statement.kind for statement in statements] == ["routine", "opaque", "end_routine"]
     assert source.encode(source.text) == data
 

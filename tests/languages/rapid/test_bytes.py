@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 import tracemalloc
 
 import pytest
@@ -74,10 +73,8 @@ def test_parentheses_without_end() -> None:
         "x:=" + "[" * 10_000 + ";",
         "x:=1" + "+1" * 10_000 + ";",
     ):
-        begin = time.perf_counter()
         statements = _read(f"MODULE m\n{text}\ny:=1;\nENDMODULE\n".encode())[1]
         assert [found.kind for found in statements] == ["module", OPAQUE, "assignment", "end_module"]
-        assert time.perf_counter() - begin < 5
         assert statements[1].shape.reason
 
 
@@ -95,11 +92,9 @@ def test_parentheses_without_end() -> None:
     ids=["sum", "word", "quotes", "comment", "call", "semicolons", "blanks"],
 )
 def test_very_long_line(line: str) -> None:
-    begin = time.perf_counter()
     statements = _read(f"MODULE m\n{line}\nVAR num a;\nENDMODULE\n".encode())[1]
     assert [found.kind for found in statements if found.line != 2] == ["module", "data", "end_module"]
     assert {found.kind for found in statements if found.line == 2} == {"comment" if line[0] == "!" else OPAQUE}
-    assert time.perf_counter() - begin < 10
 
 
 def _table(rows: int, end: str = ",\n  ") -> bytes:
@@ -122,14 +117,8 @@ def test_table_of_ten_thousand_targets(end: str) -> None:
     assert numbers.values[-17:] == [1.5, -2, 30, 1, 0, 0, 0, 0, -1, 0, 0] + [9e9] * 6
 
 
-def test_table_is_read_in_linear_time_and_memory() -> None:
-    small, large = _table(2_001), _table(16_001)
-    times = []
-    for data in (small, large):
-        begin = time.perf_counter()
-        _read(data)
-        times.append(time.perf_counter() - begin)
-    assert times[1] < 8 * 3 * times[0]
+def test_memory_of_a_table_grows_with_the_table() -> None:
+    large = _table(16_001)
     large = large.replace(ROW.encode(), LONG_ROW.encode())
     tracemalloc.start()
     kept = _read(large)[1]
@@ -161,8 +150,6 @@ def test_table_without_end_of_memory() -> None:
 
 def test_many_lines_that_never_end() -> None:
     for line in ("a,\n", "f(\n", ")\n", "x\n", "THEN\n", "IF\n", "PROC(\n", '"a;"\n', "[a,\n"):
-        begin = time.perf_counter()
         source, statements = _read(b"PROC f(\n" + (line * 20_000).encode())
-        assert time.perf_counter() - begin < 20
         block_issues("a.mod", statements)
         assert statements[-1].end >= len(source.text.rstrip()) - 1

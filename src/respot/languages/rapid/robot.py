@@ -34,29 +34,7 @@ def read_robot(name: str, root: str, files: Mapping[str, bytes]) -> Robot:
         Its files by path inside the backup. Copies of modules under ``HOME`` are not live and stay out.
     """
     issues: list[Issue] = []
-    read: dict[str, ProgramFile] = {}
-    layouts: dict[str, blocks.Layout] = {}
-    for path, data in files.items():
-        if not path.lower().endswith(SUFFIXES) or "/home/" in f"/{path.lower()}":
-            continue
-        kind = recognise(data)
-        if kind == "other":
-            issues.append(Issue("NOT_A_PROGRAM", "is no RAPID module; it is copied as it is", path))
-            continue
-        if kind == "binary":
-            issues.append(Issue("BINARY_MODULE", "an encoded module; it is copied as it is", path))
-            continue
-        source = SourceText(path, data, ENCODINGS)
-        statements = read_statements(source.text, source.line_starts)
-        layouts[path] = blocks.layout(statements)
-        if len(layouts[path].modules) > 1:
-            message = "holds more than one MODULE, as no controller saves it; it is copied as it is: split it"
-            issues.append(Issue("SEVERAL_MODULES", message, path, layouts[path].modules[1].line))
-            continue
-        program = layouts[path].name or PurePosixPath(path).stem
-        read[path] = ProgramFile(source, program, statements)
-        issues += opaque_issues(read[path])
-        issues += blocks.block_issues(path, statements)
+    read, layouts = _read_modules(files, issues)
     targets = Targets({path: file.source for path, file in read.items()})
     routines: list[Routine] = []
     tools: list[Frame] = []
@@ -86,6 +64,36 @@ def read_robot(name: str, root: str, files: Mapping[str, bytes]) -> Robot:
         bases=bases,
         issues=issues,
     )
+
+
+def _read_modules(
+    files: Mapping[str, bytes], issues: list[Issue]
+) -> tuple[dict[str, ProgramFile], dict[str, blocks.Layout]]:
+    """Live modules and what each is made of, by path; what was noticed goes to ``issues``."""
+    read: dict[str, ProgramFile] = {}
+    layouts: dict[str, blocks.Layout] = {}
+    for path, data in files.items():
+        if not path.lower().endswith(SUFFIXES) or "/home/" in f"/{path.lower()}":
+            continue
+        kind = recognise(data)
+        if kind == "other":
+            issues.append(Issue("NOT_A_PROGRAM", "is no RAPID module; it is copied as it is", path))
+            continue
+        if kind == "binary":
+            issues.append(Issue("BINARY_MODULE", "an encoded module; it is copied as it is", path))
+            continue
+        source = SourceText(path, data, ENCODINGS)
+        statements = read_statements(source.text, source.line_starts)
+        layouts[path] = blocks.layout(statements)
+        if len(layouts[path].modules) > 1:
+            message = "holds more than one MODULE, as no controller saves it; it is copied as it is: split it"
+            issues.append(Issue("SEVERAL_MODULES", message, path, layouts[path].modules[1].line))
+            continue
+        program = layouts[path].name or PurePosixPath(path).stem
+        read[path] = ProgramFile(source, program, statements)
+        issues += opaque_issues(read[path])
+        issues += blocks.block_issues(path, statements)
+    return read, layouts
 
 
 def _tasks(read: Mapping[str, ProgramFile]) -> dict[str, list[str]]:
