@@ -17,6 +17,8 @@ ROOMS = (
     "source",
     "program",
     "languages",
+    "archives",
+    "trees",
     "backups",
     "tables",
     "kinematics",

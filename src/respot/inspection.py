@@ -2,84 +2,249 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from typing import Any
 
-from scipy.spatial.transform import RigidTransform
+import numpy as np
+from scipy.spatial.transform import RigidTransform, Rotation
 
-from respot.geometry import abc_from_rotation, quaternion_from_rotation
+from respot.geometry import abc_from_rotation, quaternion_from_rotation, rotation_from_abc, rotation_from_quaternion
 from respot.program.frames import Frame
 from respot.program.moves import Move
 from respot.program.robot import Robot
 from respot.program.targets import Target, TargetKind
-from respot.spots import spots_of_robot
+from respot.spots import SpotTable
+from respot.tables import Table
+
+#: Names of the pose in a record.
+_POSE = ("x", "y", "z", "a", "b", "c", "q")
+#: ABB's 9E9: the axis is not used.
+_UNUSED = 8e9
+
+Record = dict[str, Any]
 
 
-def inspect_robot(robot: Robot, spot_id: str | None = None) -> dict[str, Any]:
-    """Record of a robot: name, programs, frames, and a target for every motion."""
-    spots = spots_of_robot(robot, (), spot_id)
+def inspect_robot(robot: Robot, spots: SpotTable) -> Record:
+    """Record of a robot: name, programs, frames, and a target for every motion.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    spots : SpotTable
+        Its weld spots.
+    """
     ids = {id(move.target): name for name, move in zip(spots.ids, spots.moves, strict=True)}
+    moves = list(robot.moves())
+    aimed = [(move, move.target) for move in moves if move.target is not None]
     return {
         "name": robot.name,
         "language": robot.language,
         "model": robot.machine.model,
+        "root": robot.root,
+        "facts": {
+            name: {"value": fact.value, "path": fact.path, "line": fact.line}
+            for name, fact in robot.machine.facts.items()
+        },
         "programs": robot.programs,
         "frames": {
             "tools": [_frame(frame) for frame in robot.tools],
             "bases": [_frame(frame) for frame in robot.bases],
         },
-        "targets": [_target(move, move.target, ids) for move in robot.moves() if move.target is not None],
+        "spots": list(spots.ids),
+        "targets": _targets(aimed, ids),
+        "unresolved": [_unresolved(move) for move in moves if move.target is None and move.unknown],
     }
 
 
-def _frame(frame: Frame) -> dict[str, Any]:
-    pose = _pose(frame.pose)
+def inspect_table(table: Table) -> Record:
+    """Record of a spot table: its spots as they will be compared, mm and degrees."""
+    rows: list[Record] = [{"id": name, "line": line} for name, line in zip(table.ids, table.lines, strict=True)]
+    if table.positions is not None:
+        for row, position in zip(rows, table.positions.tolist(), strict=True):
+            row.update(_position(position))
+    if table.rotations is not None:
+        abc, quaternion = abc_from_rotation(table.rotations), quaternion_from_rotation(table.rotations)
+        for row, angles, numbers, known in zip(rows, abc.tolist(), quaternion.tolist(), table.oriented, strict=True):
+            row.update(
+                {**dict(zip("abc", angles, strict=True)), "q": numbers}
+                if known
+                else dict.fromkeys(("a", "b", "c", "q"))
+            )
+    return {"path": table.path, "columns": list(table.columns), "spots": rows}
+
+
+def summary(record: Record) -> Record:
+    """Counts of a record by program: what a person wants to see first.
+
+    Returns
+    -------
+    dict
+        ``programs``: for each program ``spots``, ``welds``, ``targets``, ``joints``, ``unresolved``, ``tools`` and
+        ``bases``; frames that no motion uses are not among them.
+    """
+    programs: dict[str, Record] = {
+        name: {"spots": 0, "targets": 0, "joints": 0, "unresolved": 0, "tools": [], "bases": []}
+        for name in record["programs"]
+    }
+    seen: set[tuple[str, str, str]] = set()
+    for target in record["targets"]:
+        program = programs[target["program"]]
+        program["joints" if target["joints"] is not None else "targets"] += 1
+        spot = (target["program"], target["name"], str(target["spot_id"]))
+        if target["spot_id"] is not None and spot not in seen:
+            seen.add(spot)
+            program["spots"] += 1
+        for kind in ("tool", "base"):
+            name = target[kind] or "?"
+            if target["joints"] is None and name not in program[f"{kind}s"]:
+                program[f"{kind}s"].append(name)
+    for count in Counter(item["program"] for item in record["unresolved"]).items():
+        programs[count[0]]["unresolved"] = count[1]
+    return {"programs": programs}
+
+
+def _frame(frame: Frame) -> Record:
+    pose = frame.pose
+    values: list[Any] = [None] * 7
+    if pose is not None:
+        abc = abc_from_rotation(pose.rotation).tolist()
+        values = [*pose.translation.tolist(), *abc, quaternion_from_rotation(pose.rotation).tolist()]
     return {
         "name": frame.name,
         "label": frame.label,
-        **pose,
+        **dict(zip(_POSE, values, strict=True)),
         "unknown": frame.unknown,
         "path": frame.path,
         "line": frame.line,
     }
 
 
-def _target(move: Move, target: Target, ids: dict[int, str]) -> dict[str, Any]:
-    numbers = {name.lower(): float(number.value) for name, number in target.numbers.items()}
-    joints = target.kind is TargetKind.JOINTS
-    world = move.world
+def _targets(aimed: Sequence[tuple[Move, Target]], ids: dict[int, str]) -> list[Record]:
+    """Records of motions; all poses at once, since a large backup holds a hundred thousand."""
+    own = _poses([target.components for _, target in aimed])
+    in_world = _in_world(aimed, own)
+    abc, quaternion = _orientations(own)
+    world_quaternion = _orientations(in_world)[1]
+    records = []
+    for row, (move, target) in enumerate(aimed):
+        known = own[0][row]
+        pose = [*own[1][row].tolist(), *abc[row].tolist(), quaternion[row].tolist()] if known else [None] * 7
+        world = {**_position(in_world[1][row]), "q": world_quaternion[row].tolist()} if in_world[0][row] else None
+        part = {"part": {name: pose[index] for name, index in (("x", 0), ("y", 1), ("z", 2), ("q", 6))}}
+        records.append(
+            {
+                **_described(move, target, ids.get(id(target))),
+                **dict(zip(_POSE, pose, strict=True)),
+                **_configured(target),
+                **(part if move.external_tcp and known else {}),
+                "world": world,
+            }
+        )
+    return records
+
+
+#: Which rows are known, their positions (n, 3) in mm, and their rotations.
+_Poses = tuple[np.ndarray[Any, np.dtype[np.bool_]], np.ndarray[Any, np.dtype[np.float64]], Rotation]
+
+
+def _poses(components: Sequence[Sequence[float]]) -> _Poses:
+    known = np.array([bool(values) for values in components], dtype=bool)
+    positions = np.zeros((len(components), 3))
+    quaternions = np.tile([0.0, 0.0, 0.0, 1.0], (len(components), 1))
+    for count, rotation in ((6, rotation_from_abc), (7, rotation_from_quaternion)):
+        rows = [row for row, values in enumerate(components) if len(values) == count]
+        if rows:
+            numbers = np.array([components[row] for row in rows])
+            positions[rows] = numbers[:, :3]
+            quaternions[rows] = rotation(numbers[:, 3:]).as_quat()
+    return known, positions, Rotation.from_quat(quaternions)
+
+
+def _in_world(aimed: Sequence[tuple[Move, Target]], own: _Poses) -> _Poses:
+    """Poses in the world, base by base."""
+    known, positions, quaternions = np.zeros(len(aimed), dtype=bool), own[1].copy(), own[2].as_quat()
+    by_base: dict[int, list[int]] = {}
+    bases: dict[int, RigidTransform] = {}
+    for row, (move, _) in enumerate(aimed):
+        if own[0][row] and not move.external_tcp and move.base is not None and move.base.pose is not None:
+            by_base.setdefault(id(move.base), []).append(row)
+            bases[id(move.base)] = move.base.pose
+    for key, rows in by_base.items():
+        base = bases[key]
+        known[rows] = True
+        positions[rows] = base.apply(positions[rows])
+        quaternions[rows] = (base.rotation * Rotation.from_quat(quaternions[rows])).as_quat()
+    return known, positions, Rotation.from_quat(quaternions)
+
+
+def _orientations(poses: _Poses) -> tuple[Any, Any]:
+    if not len(poses[0]):
+        return np.zeros((0, 3)), np.zeros((0, 4))
+    return abc_from_rotation(poses[2]), quaternion_from_rotation(poses[2])
+
+
+def _position(values: Iterable[float]) -> dict[str, float]:
+    return {name: float(value) for name, value in zip("xyz", values, strict=True)}
+
+
+def _described(move: Move, target: Target, spot_id: str | None) -> Record:
     return {
         "name": target.name,
-        "spot_id": ids.get(id(target)),
+        "spot_id": spot_id,
         "program": move.program,
         "routine": move.routine,
         "path": move.path,
         "line": move.line,
+        "declared": {"path": target.path, "line": target.line},
         "kind": move.motion.value,
         "weld": move.weld,
         "tool": None if move.tool is None else str(move.tool),
         "base": None if move.base is None else str(move.base),
         "external_tcp": move.external_tcp,
-        **_pose(None if joints else target.pose),
+        "doubt": _doubt(move, target),
+    }
+
+
+def _doubt(move: Move, target: Target) -> str | None:
+    """Why the place of a target is not known, or None."""
+    if target.kind is TargetKind.JOINTS:
+        return None
+    if move.unknown or target.unknown:
+        return move.unknown or target.unknown
+    if move.base2spots is None:
+        return "the program does not tell the base" if move.base is None else f"{move.base}: {move.base.unknown}"
+    return None
+
+
+def _configured(target: Target) -> Record:
+    """Joints, external axes, status and turn or confdata of a target."""
+    numbers = {name.lower(): float(number.value) for name, number in target.numbers.items()}
+    joints = target.kind is TargetKind.JOINTS
+    return {
         "joints": {name: value for name, value in numbers.items() if name.startswith(("a", "rax"))} if joints else None,
         "external_axes": {
             name: value
             for name, value in numbers.items()
-            if name[0] == "e" and name[1:2] in "123456ax" and abs(value) < 9e8
+            if name[0] == "e" and name[1:2] in "123456ax" and abs(value) < _UNUSED
         },
         "status": _whole(numbers.get("s")),
         "turn": _whole(numbers.get("t")),
         "confdata": [_whole(numbers[name]) for name in ("cf1", "cf4", "cf6", "cfx")] if "cf1" in numbers else None,
-        **({"part": {key: _pose(target.pose)[key] for key in ("x", "y", "z", "q")}} if move.external_tcp else {}),
-        "world": None if world is None else {key: _pose(world)[key] for key in ("x", "y", "z", "q")},
+    }
+
+
+def _unresolved(move: Move) -> Record:
+    return {
+        "instruction": move.instruction,
+        "program": move.program,
+        "routine": move.routine,
+        "path": move.path,
+        "line": move.line,
+        "reason": move.unknown,
     }
 
 
 def _whole(value: float | None) -> int | None:
     return None if value is None else int(value)
-
-
-def _pose(pose: RigidTransform | None) -> dict[str, Any]:
-    if pose is None:
-        return dict.fromkeys(("x", "y", "z", "a", "b", "c", "q"))
-    values = [*pose.translation.tolist(), *abc_from_rotation(pose.rotation).tolist()]
-    return {**dict(zip("xyzabc", values, strict=True)), "q": quaternion_from_rotation(pose.rotation).tolist()}

@@ -17,6 +17,7 @@ from respot.backups import Backup, open_backup
 from respot.geometry import Array
 from respot.issues import BadInputError, Issue
 from respot.languages import LANGUAGES
+from respot.languages.forms import read_profile
 from respot.program.moves import Move
 from respot.program.robot import Robot
 from respot.tables import Table, read_table
@@ -31,9 +32,9 @@ class SpotTable:
     ids : sequence of str
         Spot IDs, each once.
     positions : (n, 3) array
-        TCP in the world, mm (of a table: as the table has them).
+        TCP in the world, mm; with an external TCP in the part frame.
     rotations : Rotation or None
-        ``tool2world``, batch of n.
+        Orientations in the same coordinates, batch of n.
     moves : sequence of Move
         The motion that welds each spot; empty for a table.
     issues : sequence of Issue
@@ -83,7 +84,11 @@ class Source:
 
 
 def read_source(
-    path: Path, reference_ids: Collection[str] = (), spot_id: str | None = None, robot_name: str | None = None
+    path: Path,
+    reference_ids: Collection[str] = (),
+    spot_id: str | None = None,
+    robot_name: str | None = None,
+    profiles: Sequence[Path] = (),
 ) -> Source:
     """Read a source.
 
@@ -97,35 +102,50 @@ def read_source(
         Regular expression for spot IDs.
     robot_name : str, optional
         Which robot of a backup with several.
+    profiles : sequence of Path
+        A plant's instruction forms.
 
     Raises
     ------
     BadInputError
-        The source cannot be read, or it is not clear which robot is meant.
+        The source or a profile cannot be read, or it is not clear which robot is meant.
     """
-    if not _is_backup(path):
+    if not is_backup(path):
         table = read_table(path)
         return Source(path, spots_of_table(table), table.sha256)
-    backup = open_backup(path)
+    backup = open_backup(path, [read_profile(profile) for profile in profiles])
     robot = backup.robot(robot_name)
     return Source(path, spots_of_robot(robot, reference_ids, spot_id), backup.sha256, backup, robot)
 
 
-def _is_backup(path: Path) -> bool:
+def is_backup(path: Path) -> bool:
+    """Whether a path is taken for a backup or a program, not for a table: by its suffix, or since it is a folder."""
     suffixes = tuple(suffix for language in LANGUAGES.values() for suffix in language.suffixes)
     return path.is_dir() or path.suffix.lower() == ".zip" or path.name.lower().endswith(suffixes)
 
 
 def spots_of_table(table: Table) -> SpotTable:
-    """Return the spots of a table."""
-    return SpotTable(table.ids, table.positions, table.rotations)
+    """Return the spots of a table; orientations only where every row has one.
+
+    Raises
+    ------
+    BadInputError
+        ``MISSING_COLUMN`` if the table has joints and no positions.
+    """
+    issues = list(table.issues)
+    missing = len(table.ids) - sum(table.oriented)
+    if table.rotations is not None and missing:
+        message = f"{missing} of {len(table.ids)} rows have no orientation; only the positions are used"
+        issues.append(Issue("PARTLY_ORIENTED", message, table.path))
+    rotations = None if missing else table.rotations
+    return SpotTable(table.ids, table.positions, rotations, issues=issues)
 
 
 def spots_of_robot(robot: Robot, reference_ids: Collection[str] = (), pattern: str | None = None) -> SpotTable:
     """Find the weld spots of a robot's programs.
 
-    A target is a spot if its motion welds; with a reference list at hand also if its name is in the list and no other
-    target of that name welds (INTERFACES, sources and references).
+    A target is a spot if its motion welds, and otherwise if its name is that of a weld spot or, with a reference list
+    at hand, in the list. The same ID on several targets: the one that welds (INTERFACES, sources and references).
 
     Parameters
     ----------
@@ -143,13 +163,13 @@ def spots_of_robot(robot: Robot, reference_ids: Collection[str] = (), pattern: s
     """
     chooser = _Chooser(reference_ids, pattern)
     welds: dict[str, list[Move]] = {}
-    named: dict[str, list[Move]] = {}
+    others: dict[str, list[Move]] = {}
     for move in robot.moves():
         spot_id = chooser.choose(move)
         if spot_id is not None:
-            (welds if move.weld else named).setdefault(spot_id, []).append(move)
-    for spot_id, moves in named.items():
-        if spot_id not in welds and chooser.listed(spot_id):
+            (welds if move.weld else others).setdefault(spot_id, []).append(move)
+    for spot_id, moves in others.items():
+        if spot_id not in welds and (chooser.listed(spot_id) or chooser.tells(moves)):
             welds[spot_id] = moves
     ids: list[str] = []
     kept: list[Move] = []
@@ -161,10 +181,25 @@ def spots_of_robot(robot: Robot, reference_ids: Collection[str] = (), pattern: s
         else:
             ids.append(spot_id)
             kept.append(moves[0])
-    poses = [world for move in kept if (world := move.world) is not None]
+    issues += _drop_other_frame(ids, kept)
+    poses = [pose for move in kept if (pose := move.spot_pose) is not None]
     positions = np.array([pose.translation for pose in poses]).reshape(-1, 3)
     rotations = Rotation.concatenate([pose.rotation for pose in poses]) if poses else None
     return SpotTable(ids, positions, rotations, kept, issues)
+
+
+def _drop_other_frame(ids: list[str], moves: list[Move]) -> list[Issue]:
+    """Keep either the spots in the world or those in the part frame: one transform cannot hold for both."""
+    external = [move.external_tcp for move in moves]
+    fewer = sum(external) * 2 <= len(external)  # are those with an external TCP
+    dropped = [name for name, is_external in zip(ids, external, strict=True) if is_external == fewer]
+    if not dropped or len(dropped) == len(ids):
+        return []
+    kept = [(name, move) for name, move in zip(ids, moves, strict=True) if move.external_tcp != fewer]
+    ids[:], moves[:] = [name for name, _ in kept], [move for _, move in kept]
+    which = "with an external TCP, in the part frame" if fewer else "with the gun on the robot, in the world"
+    message = f"{', '.join(dropped)}: welded {which}, unlike the {len(ids)} others: left out"
+    return [Issue("EXTERNAL_TCP", message)]
 
 
 def _doubt(spot_id: str, moves: Sequence[Move]) -> Issue | None:
@@ -176,9 +211,7 @@ def _doubt(spot_id: str, moves: Sequence[Move]) -> Issue | None:
         return Issue("AMBIGUOUS_SPOT", f"{spot_id} is welded at several targets: {where}", first.path, first.line)
     if first.unknown:
         return Issue("RUN_TIME_POSE", f"{spot_id}: {first.unknown}", first.path, first.line)
-    if first.external_tcp:
-        return Issue("EXTERNAL_TCP", f"{spot_id}: the robot holds the part; not supported yet", first.path, first.line)
-    if first.world is None:
+    if first.spot_pose is None:
         reason = first.base.unknown if first.base is not None else "the program does not set it"
         if first.target is not None and first.target.unknown:
             return Issue("RUN_TIME_POSE", f"{spot_id}: {first.target.unknown}", first.path, first.line)
@@ -197,6 +230,7 @@ class _Chooser:
             raise BadInputError("BAD_OPTION", f"--spot-id {pattern!r} is no regular expression: {error}") from error
 
     def choose(self, move: Move) -> str | None:
+        """ID of a motion: the first that the reference lists, else the first at all."""
         candidates = self._candidates(move)
         for candidate in candidates:
             if candidate.casefold() in self._reference:
@@ -204,11 +238,16 @@ class _Chooser:
         return candidates[0] if candidates else None
 
     def listed(self, spot_id: str) -> bool:
+        """Whether the reference has the ID."""
         return spot_id.casefold() in self._reference
+
+    def tells(self, moves: Sequence[Move]) -> bool:
+        """Whether the name alone makes a spot of a target that nothing is known to weld."""
+        return self._pattern is not None or any(move.named_spot for move in moves)
 
     def _candidates(self, move: Move) -> list[str]:
         if self._pattern is None:
             return list(move.spot_ids)
-        matches = (self._pattern.search(name) for name in move.spot_ids)
+        matches = (self._pattern.search(label.text) for label in move.labels)
         found = (match.group(1 if match.re.groups else 0) for match in matches if match)
         return [text for text in found if text]

@@ -44,7 +44,7 @@ TABLES = {
     "header_only": (GOOD[:1], "BAD_TABLE", "table.csv:1"),
     "no_x_column": (["id,u,y,z", *GOOD[1:]], "MISSING_COLUMN", "table.csv:1", "column x"),
     "a_nan": (changed(5, "P02WP1615435,nan,240.44,1276.54"), "NOT_A_NUMBER", "table.csv:5", "x is 'nan'"),
-    "a_word": (changed(5, "P02WP1615435,12 mm,240.44,1276.54"), "NOT_A_NUMBER", "table.csv:5"),
+    "a_word": (changed(5, "P02WP1615435,twelve,240.44,1276.54"), "NOT_A_NUMBER", "table.csv:5"),
     "a_missing_cell": (changed(5, "P02WP1615435,4313.76,240.44"), "BAD_TABLE", "table.csv:5"),
     "an_empty_id": (changed(5, ",4313.76,240.44,1276.54"), "BAD_TABLE", "table.csv:5"),
     "a_duplicate_id": ([*GOOD, GOOD[3]], "DUPLICATE_ID", "table.csv:16", "line 4"),

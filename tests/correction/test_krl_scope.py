@@ -120,11 +120,6 @@ def test_programs_takes_a_glob_in_place_of_the_spots(tmp_path):
     assert done.edited() == {"XP9"}
 
 
-def test_external_tcp_is_refused(tmp_path):
-    done = convert(tmp_path, krl(body=lin("P1"), data=krl_point("P1", 5, 6, 7) + fdat("P1", mode="#TCP")))
-    assert done.refusals() == {("weld", "XP1", "EXTERNAL_TCP")}
-
-
 @pytest.mark.parametrize("code", ["XP1=$POS_ACT\n", "XP1.Z=XP1.Z+5\n"])
 def test_a_point_that_the_program_changes_is_refused(tmp_path, code):
     done = convert(tmp_path, krl(body=code + lin("P1"), data=krl_point("P1", 5, 6, 7) + fdat("P1")))

@@ -145,11 +145,17 @@ def test_a_wrapper_is_known_by_the_types_of_its_arguments(tmp_path):
     assert "p1" in done.edited()
 
 
-def test_a_target_handed_to_an_unknown_routine_is_refused(tmp_path):
+def test_a_wrapper_with_its_own_frames_is_judged_where_it_is_called(tmp_path):
     routine = "  PROC rGo(robtarget p)\n    MoveL p,v100,z10,tGun\\WObj:=wDoor;\n  ENDPROC\n"
     done = run(tmp_path, rapid(body="    rGo p1;\n", data=P1, after=routine))
+    assert done.code == 0, done.err
+    assert xyz(done.text("Weld.mod"), "p1:=") == pytest.approx(krl_in_base1(moved(in_world((5, 6, 7)))), abs=6e-5)
+
+
+def test_a_target_handed_to_an_unknown_routine_is_refused(tmp_path):
+    done = run(tmp_path, rapid(body="    rNotHere p1;\n", data=P1))
     assert done.code == 1
-    assert {code for _, _, code in done.refusals()} == {"RUN_TIME_POSE", "UNKNOWN_FRAME"}
+    assert {code for _, _, code in done.refusals()} == {"UNKNOWN_FRAME"}
     assert done.edited() == set()
 
 
@@ -292,7 +298,7 @@ def test_a_held_work_object_is_no_fixed_base_even_if_the_tool_is_unknown(tmp_pat
     files["RAPID/TASK1/PROGMOD/Weld.mod"] = files["RAPID/TASK1/PROGMOD/Weld.mod"].replace("tGun", "tNowhere")
     done = run(tmp_path, files)
     assert done.code == 2
-    assert "EXTERNAL_TCP" in done.err
+    assert "whether the gun stands still is not known" in done.err
 
 
 def test_persistent_targets_of_several_tasks_are_copies(tmp_path):

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from respot.registration.exchanged import find_exchanged
-from respot.registration.matching import match_by_id
+from respot.registration.matching import match_by_id, match_by_name
 
 SEEDS = st.integers(0, 2**32 - 1)
 CLEAN, FLANGE = (0.3, 0.3, 0.3), (0.5, 4.9, 1.7)
@@ -141,3 +141,59 @@ def test_a_displaced_spot_does_not_hide_an_exchange():
     reference[[2, 9]] = reference[[9, 2]]
     reference[5] += [0, 37, 0]
     assert found(source, reference) == {(2, 9)}
+
+
+@pytest.mark.parametrize(
+    ("own", "other", "rule"),
+    [
+        ("P02WP1615438", "p02wp1615438", "case or separators"),
+        ("P02-WP_1615438", "P02WP1615438", "case or separators"),
+        ("P1_2", "P1-2", "case or separators"),
+        ("P02WP15", "P2WP0015", "leading zeros"),
+        ("SP_7_1", "SP_7", "variant"),
+        ("SP7", "SP7_new", "variant"),
+    ],
+)
+def test_the_same_name_written_otherwise(own, other, rule):
+    match = match_by_name(["Q1", own, "Q9"], ["Z4", other, "Q1"])
+    assert (match.ids, match.reference_ids, match.rules) == (("Q1", own), ("Q1", other), ("", rule))
+    assert (match.missing, match.extra) == (("Q9",), ("Z4",))
+
+
+@pytest.mark.parametrize(
+    ("own", "other"),
+    [
+        ("P1_2", "P12"),  # two numbers are not one
+        ("SP_7", "SP_9"),  # two spots, not two variants
+        ("SP_L", "SP_R"),
+        ("SP", "SP_L"),
+        ("WP1", "WP10"),
+    ],
+)
+def test_names_that_only_look_alike_stay_apart(own, other):
+    assert match_by_name([own], [other]).ids == ()
+
+
+def test_a_prefix_or_suffix_that_a_whole_list_has():
+    plain = ["WP10", "WP20", "WP30", "WP40"]
+    match = match_by_name([f"020R01_{name}" for name in plain], plain)
+    assert match.reference_ids == tuple(plain)
+    assert set(match.rules) == {"prefix or suffix"}
+    match = match_by_name(plain, [f"{name}_GEO" for name in plain])
+    assert match.ids == tuple(plain)
+    assert match_by_name(plain[:2], [f"A{name}" for name in plain[:2]]).ids == ()  # two names make no rule
+    assert match_by_name(["5", "6", "7"], ["15", "16", "17"]).ids == ()  # nor is a number ever cut in two
+
+
+def test_a_rule_never_chooses_between_two_names():
+    match = match_by_name(["SP7_1", "SP7_2"], ["SP7"])
+    assert match.ids == ()
+    assert match.missing == ("SP7_1", "SP7_2")
+    assert match_by_name(["p1", "P1"], ["P1"]).ids == ("P1",)  # the equal name comes first, and takes it
+    assert match_by_name(["p1", "P01"], ["P001"]).ids == ()
+
+
+def test_an_equal_name_is_never_given_up_for_a_rule():
+    match = match_by_name(["A1", "a1"], ["a1", "A1"])
+    assert match.reference_ids == ("A1", "a1")
+    assert match.rules == ("", "")

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from respot.registration.alternatives import fit_affine, fit_translation
+from respot.registration.affine import fit_affine
+from respot.registration.alternatives import fit_translation
 from respot.registration.covariance import jacobian, leverage, unit_covariance
 from respot.registration.errors import DegenerateError, RegistrationError
 from respot.registration.leave_one_out import leave_one_out

@@ -18,6 +18,7 @@ from respot.registration.rigid import homogeneous
 Array = NDArray[np.float64]
 Kind = Literal["theory", "measured"]
 Frame = Literal["same", "free"]
+Method = Literal["robust", "paper"]
 
 SCHEMA = "respot.calibration/1"
 _ORTHOGONAL = 1e-9
@@ -56,12 +57,14 @@ class Calibration:
         Names of the pairs it was fitted to, in order of the source.
     provenance : mapping
         Hashes, version, options: JSON values, not part of the content hash.
+    method : "robust" or "paper"
+        How it was fitted. An unconstrained (affine) solution is no calibration: it is no rigid motion.
 
     Raises
     ------
     CalibrationError
         ``CALIBRATION_NOT_RIGID`` for a matrix that is no rotation or numbers that are not finite;
-        ``CALIBRATION_INCOMPLETE`` for an unknown kind or frame.
+        ``CALIBRATION_INCOMPLETE`` for an unknown kind, frame or method.
     """
 
     rotation: Array
@@ -70,6 +73,7 @@ class Calibration:
     frame: Frame
     ids: tuple[str, ...] = ()
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    method: Method = "robust"
 
     def __post_init__(self) -> None:
         rotation, translation = np.array(self.rotation, dtype=np.float64), np.array(self.translation, dtype=np.float64)
@@ -80,6 +84,8 @@ class Calibration:
             raise CalibrationError("CALIBRATION_NOT_RIGID", "the matrix is no rotation: this is no rigid calibration")
         if self.kind not in ("theory", "measured") or self.frame not in ("same", "free"):
             raise CalibrationError("CALIBRATION_INCOMPLETE", f"unknown kind or frame: {self.kind!r}, {self.frame!r}")
+        if self.method not in ("robust", "paper"):
+            raise CalibrationError("CALIBRATION_INCOMPLETE", f"unknown method: {self.method!r}")
         for name, value in (("rotation", rotation), ("translation", translation)):
             value += 0.0  # no negative zero: it would print, and hash, differently
             value.setflags(write=False)
@@ -109,7 +115,7 @@ class Calibration:
         return moved, None if rotations is None else Rotation.from_matrix(self.rotation) * rotations
 
     def inverse(self) -> Calibration:
-        """Return the calibration from reference to source; kind, frame and ids stay, the provenance says so."""
+        """Return the calibration from reference to source; kind, frame, ids and method stay, the provenance says so."""
         rotation = self.rotation.T
         return Calibration(
             rotation=rotation,
@@ -118,6 +124,7 @@ class Calibration:
             frame=self.frame,
             ids=self.ids,
             provenance={**self.provenance, "inverse_of": self.content_hash},
+            method=self.method,
         )
 
     @property
@@ -127,7 +134,9 @@ class Calibration:
         return hashlib.sha256(text.encode("ascii")).hexdigest()
 
     def _content(self) -> dict[str, Any]:
+        # A method is said only where it is not the usual one: calibrations saved without the word keep their hash.
         return {
+            **({} if self.method == "robust" else {"method": self.method}),
             "schema": SCHEMA,
             "kind": self.kind,
             "frame": self.frame,
@@ -140,6 +149,7 @@ class Calibration:
         """JSON text of schema `SCHEMA`; equal calibrations give equal text."""
         record = {
             **self._content(),
+            "method": self.method,
             "hash": self.content_hash,
             "ids": list(self.ids),
             "provenance": dict(self.provenance),
@@ -166,6 +176,7 @@ class Calibration:
                 frame=record["frame"],
                 ids=tuple(str(name) for name in record["ids"]),
                 provenance=dict(record["provenance"]),
+                method=record.get("method", "robust"),
             )
             stated = record["hash"]
         except KeyError as error:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,93 +11,26 @@ from scipy.spatial.transform import Rotation
 
 from respot.calibration.calibration import Calibration, Frame, Kind
 from respot.calibration.effects import swapped_ids
-from respot.calibration.effects.effect import Effect
-from respot.calibration.uncertainty import TransformUncertainty, transform_uncertainty
-from respot.registration.alternatives import AffineFit, TranslationFit, fit_affine, fit_translation
+from respot.calibration.methods import affine_fit, paper_fit
+from respot.calibration.spot_fit import Method, SpotFit
+from respot.calibration.uncertainty import transform_uncertainty
+from respot.registration.affine import fit_affine
+from respot.registration.alternatives import fit_translation
 from respot.registration.errors import DegenerateError, RegistrationError
-from respot.registration.exchanged import ExchangeResult, find_exchanged
+from respot.registration.exchanged import find_exchanged
 from respot.registration.leave_one_out import leave_one_out
-from respot.registration.matching import IdMatch, match_by_id
+from respot.registration.matching import IdMatch, Matching
+from respot.registration.pairing import Note, pair_spots
 from respot.registration.rigid import RigidFit, check_pairs, fit_rigid
-from respot.registration.robust import RobustFit
-from respot.registration.statistics import ResidualDirections, residual_directions
-from respot.registration.support import RotationSupport, rotation_support
+from respot.registration.statistics import residual_directions
+from respot.registration.support import rotation_support
 
 Array = NDArray[np.float64]
 
 LEAST_PAIRS = 4
+DEFAULT_FRAME: Mapping[Kind, Frame] = {"theory": "same", "measured": "free"}
 LATERAL_NOISE = 3.0
 """Spots must stray from their best line by this many times the noise (RMS), or the turn about it is noise alone."""
-
-
-@dataclass(frozen=True, eq=False)
-class SpotFit:
-    """Everything that a fit of n pairs found. All lengths mm, all residuals predicted minus reference.
-
-    Attributes
-    ----------
-    calibration : Calibration
-        The final model.
-    match : IdMatch or None
-        How the pairs were formed, where two lists were given.
-    ids, reference_ids : tuples of n str
-        Name of each pair in the source; name of the reference spot it belongs to, repaired.
-    source, reference : (n, 3) arrays
-        Source spots; the reference spots they belong to, names repaired.
-    source_rotations : Rotation of n, or None
-    as_found : (n, 3) array
-        Source minus reference as named.
-    before : RigidFit
-        Least squares of all pairs as named.
-    before_loo, after_loo : (n, 3) arrays
-        Leave-one-out residuals as named; and of the final structure (an outlier is judged by the fit of the inliers).
-    exchanged : ExchangeResult
-    robust : RobustFit
-        Inliers, scale, and ``rigid``: the final least-squares fit.
-    affine : AffineFit or None
-        The unconstrained 12 parameters over all pairs as named; None for coplanar spots.
-    translation : TranslationFit
-        Translation alone, over the inliers with names repaired.
-    directions : ResidualDirections
-        Of the inliers.
-    support : RotationSupport
-    uncertainty : TransformUncertainty
-    effects : tuple of Effect
-    noise : float or None
-        Noise per coordinate known from elsewhere.
-    """
-
-    calibration: Calibration
-    match: IdMatch | None
-    ids: tuple[str, ...]
-    reference_ids: tuple[str, ...]
-    source: Array
-    reference: Array
-    source_rotations: Rotation | None
-    as_found: Array
-    before: RigidFit
-    before_loo: Array
-    after_loo: Array
-    exchanged: ExchangeResult
-    robust: RobustFit
-    affine: AffineFit | None
-    translation: TranslationFit
-    directions: ResidualDirections
-    support: RotationSupport
-    uncertainty: TransformUncertainty
-    effects: tuple[Effect, ...]
-    noise: float | None
-
-    @property
-    def calibrated(self) -> Array:
-        """Source spots under the final model (n, 3), reference frame [mm]."""
-        return self.robust.rigid.predict(self.source)
-
-    @property
-    def repaired(self) -> NDArray[np.bool_]:
-        """Which pairs (n,) got another name than they came with."""
-        changed: NDArray[np.bool_] = self.exchanged.permutation != np.arange(len(self.ids))
-        return changed
 
 
 def fit_tables(
@@ -112,9 +44,13 @@ def fit_tables(
     source_rotations: Rotation | None = None,
     noise: float | None = None,
     seed: int = 0,
+    method: Method = "robust",
+    tau: float | None = None,
+    n_min: int | None = None,
+    matching: Matching = "auto",
     provenance: Mapping[str, Any] | None = None,
 ) -> SpotFit:
-    """Match two lists by name and fit them; parameters and errors as `fit_spots`.
+    """Pair two lists and fit them; parameters and errors as `fit_spots`.
 
     Parameters
     ----------
@@ -122,36 +58,36 @@ def fit_tables(
         The spots of the programs: n names, (n, 3) [mm], n orientations.
     reference_ids, reference
         What they are compared with: m names, (m, 3) [mm].
+    matching : "auto", "id" or "geometry"
+        How spots are paired; see `respot.registration.pairing.pair_spots`.
 
     Raises
     ------
     RegistrationError
-        Also ``DUPLICATE_ID`` for a name that occurs twice in a list, ``NO_COMMON_IDS`` where no name is in both.
+        Also as `respot.registration.pairing.pair_spots`.
     """
     for which, ids, points in (("source", source_ids, source), ("reference", reference_ids, reference)):
         if np.shape(points) != (len(ids), 3):
             raise RegistrationError("SHAPE_MISMATCH", f"{which}: {len(ids)} names for points {np.shape(points)}")
-    match = match_by_id(source_ids, reference_ids)
-    for which, names in (("source", match.source_duplicates), ("reference", match.reference_duplicates)):
-        if names:
-            shown = ", ".join(names[:5]) + (" ..." if len(names) > 5 else "")
-            raise RegistrationError("DUPLICATE_ID", f"named more than once in the {which} list: {shown}", ids=names)
-    if not match.ids:
-        raise RegistrationError(
-            "NO_COMMON_IDS",
-            f"none of the {match.n_source} source spots has the name of one of the {match.n_reference} reference spots",
-        )
+    first, second = np.asarray(source, dtype=np.float64), np.asarray(reference, dtype=np.float64)
+    same_frame = (frame or DEFAULT_FRAME[kind]) == "same"
+    pairing = pair_spots(source_ids, first, reference_ids, second, way=matching, same_frame=same_frame, seed=seed)
+    match = pairing.match
     return fit_spots(
         match.ids,
-        np.asarray(source, dtype=np.float64)[match.source_rows],
-        np.asarray(reference, dtype=np.float64)[match.reference_rows],
+        first[match.source_rows],
+        second[match.reference_rows],
         kind=kind,
         frame=frame,
         source_rotations=None if source_rotations is None else source_rotations[match.source_rows],
         noise=noise,
         seed=seed,
+        method=method,
+        tau=tau,
+        n_min=n_min,
         provenance=provenance,
         match=match,
+        notes=pairing.notes,
     )
 
 
@@ -165,8 +101,12 @@ def fit_spots(
     source_rotations: Rotation | None = None,
     noise: float | None = None,
     seed: int = 0,
+    method: Method = "robust",
+    tau: float | None = None,
+    n_min: int | None = None,
     provenance: Mapping[str, Any] | None = None,
     match: IdMatch | None = None,
+    notes: tuple[Note, ...] = (),
 ) -> SpotFit:
     """Fit paired spots: names, inliers, rigid transform, and how sure all of it is.
 
@@ -183,16 +123,25 @@ def fit_spots(
     noise : float, optional
         Standard deviation per coordinate, known independently [mm].
     seed : int
-        Of the consensus start and of permutation draws.
+        Of the consensus start, of permutation draws and of the paper's random subsets.
+    method : "robust", "paper" or "affine"
+        The final model: ours, the paper's own method, or its unconstrained equation (6), which is no calibration.
+    tau : float, optional
+        Of the method "paper": largest residual of an inlier [mm].
+    n_min : int, optional
+        Of the method "paper": a subset qualifies with more inliers than this.
     provenance : mapping, optional
         JSON values that the calibration keeps.
     match : IdMatch, optional
-        Where the pairs come from, for the counts.
+        Where the pairs come from, for the counts and the reference's own names.
+    notes : tuple of Note
+        What was noticed while pairing.
 
     Raises
     ------
     RegistrationError
-        ``SHAPE_MISMATCH``, ``NOT_A_NUMBER``, ``TOO_FEW_PAIRS``, ``DUPLICATE_ID``.
+        ``SHAPE_MISMATCH``, ``NOT_A_NUMBER``, ``TOO_FEW_PAIRS``, ``DUPLICATE_ID``; as `fit_paper` for the method
+        "paper"; ``COPLANAR_SPOTS`` for the method "affine".
     DegenerateError
         ``COLLINEAR_SPOTS``: on a line, or off it by no more than `LATERAL_NOISE` times the noise.
     """
@@ -205,19 +154,20 @@ def fit_spots(
     calibrated = robust.rigid.predict(first)
     uncertainty = transform_uncertainty(calibrated[inliers], robust.rigid.residuals[inliers])
     _require_breadth(robust.rigid, uncertainty.sigma)
-    calibration = Calibration(
+    reference_names = names if match is None or not match.reference_ids else match.reference_ids
+    model = Calibration(
         rotation=robust.rigid.rotation,
         translation=robust.rigid.translation,
         kind=kind,
-        frame=frame or ("same" if kind == "theory" else "free"),
+        frame=frame or DEFAULT_FRAME[kind],
         ids=names,
         provenance=dict(provenance or {}),
     )
-    return SpotFit(
-        calibration=calibration,
+    fit = SpotFit(
+        model=model,
         match=match,
         ids=names,
-        reference_ids=tuple(names[row] for row in exchanged.permutation),
+        reference_ids=tuple(reference_names[row] for row in exchanged.permutation),
         source=first,
         reference=repaired,
         source_rotations=source_rotations,
@@ -234,7 +184,11 @@ def fit_spots(
         uncertainty=uncertainty,
         effects=swapped_ids.effects_of(exchanged, names, second, kind=kind),
         noise=noise,
+        notes=notes,
     )
+    if method == "paper":
+        return paper_fit(fit, tau=tau, n_min=n_min, seed=seed)
+    return affine_fit(fit) if method == "affine" else fit
 
 
 def _check(names: tuple[str, ...], source: ArrayLike, reference: ArrayLike) -> tuple[Array, Array]:

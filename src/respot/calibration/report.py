@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import isfinite
 from typing import Any
 
@@ -9,31 +10,53 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from respot.calibration.fit import SpotFit
+from respot.calibration.spot_fit import SpotFit
 from respot.calibration.uncertainty import PARAMETERS
 from respot.geometry import abc_from_rotation
+from respot.registration.affine import AffineFit
+from respot.registration.matching import EXACT, PLACE, IdMatch
+from respot.registration.paper import PaperFit
 from respot.registration.statistics import distances, rms
 
 Array = NDArray[np.float64]
 
 
 def report(fit: SpotFit) -> dict[str, Any]:
-    """Return the JSON object of a fit, without schema, version and issues."""
+    """Return the JSON object of a fit, without schema, version and issues.
+
+    Of the method "paper" the entry ``paper`` holds what was chosen and ``robust`` our fit of the same pairs; of the
+    method "affine" the figures after the fit are those of the 12 free parameters, the transform is null, and ``robust``
+    holds our fit.
+    """
+    record = _report(fit)
+    if fit.method == "paper" and fit.paper is not None and fit.paper_mean_square is not None:
+        record["paper"] = {
+            **_paper(fit.paper, fit.ids),
+            "mean_square_reading": _paper(fit.paper_mean_square, fit.ids),
+        }
+    if fit.method == "affine" and fit.affine is not None:
+        record.update(_affine_figures(fit, fit.affine, record))
+    if fit.beside is not None:
+        record["robust"] = _report(fit.beside)
+    return record
+
+
+def _report(fit: SpotFit) -> dict[str, Any]:
     inliers, rigid = fit.robust.inliers, fit.robust.rigid
     n = len(fit.ids)
     return {
-        "kind": fit.calibration.kind,
-        "frame": fit.calibration.frame,
+        "method": fit.method,
+        "kind": fit.model.kind,
+        "frame": fit.model.frame,
         "n_source": fit.match.n_source if fit.match else n,
         "n_reference": fit.match.n_reference if fit.match else n,
         "n_matched": n,
         "n_inliers": int(inliers.sum()),
         "missing": list(fit.match.missing) if fit.match else [],
         "extra": list(fit.match.extra) if fit.match else [],
+        "matching": None if fit.match is None else _matching(fit.match),
         "transform": _transform(fit),
-        "affine_12": None
-        if fit.affine is None
-        else {"matrix": fit.affine.matrix.tolist(), "rms": rms(fit.affine.residuals)},
+        "affine_12": None if fit.affine is None else _affine(fit.affine),
         "translation_only": {
             "translation": fit.translation.translation.tolist(),
             "rms": rms(fit.translation.residuals),
@@ -75,12 +98,100 @@ def report(fit: SpotFit) -> dict[str, Any]:
     }
 
 
+def _affine(fit: AffineFit) -> dict[str, Any]:
+    return {
+        "matrix": fit.matrix.tolist(),
+        "rms": rms(fit.residuals),
+        "leave_one_out": _number(rms(fit.leave_one_out)),
+        "spread": fit.spread.tolist(),
+        "stretches": fit.stretches.tolist(),
+        "shear": fit.shear,
+        "departure": fit.departure,
+        "reflects": fit.reflects,
+    }
+
+
+def _affine_figures(fit: SpotFit, affine: AffineFit, rigid: dict[str, Any]) -> dict[str, Any]:
+    """Entries of the report that the unconstrained model fills in the rigid one's place."""
+    predicted = fit.source @ affine.matrix[:3, :3].T + affine.matrix[:3, 3]
+    after = distances(affine.residuals).to_dict()
+    spots = [
+        {
+            **spot,
+            "reference_id": name,
+            "repaired": False,
+            "after": float(np.linalg.norm(residual)),
+            **dict(zip(("x", "y", "z", "dx", "dy", "dz"), [*point.tolist(), *residual.tolist()], strict=True)),
+            **dict.fromkeys(("a", "b", "c")),
+            "inlier": True,
+            "weight": 1.0,
+        }
+        for spot, name, point, residual in zip(
+            rigid["spots"], fit.reference_ids_as_named, predicted, affine.residuals, strict=True
+        )
+    ]
+    return {
+        "transform": None,
+        "effects": [],
+        "n_inliers": len(fit.ids),
+        "after": after,
+        "after_all": after,
+        "leave_one_out": {**rigid["leave_one_out"], "after": _number(rms(affine.leave_one_out))},
+        "heldout": {**rigid["heldout"], "after": _statistics(affine.leave_one_out), "repaired_ids": []},
+        "inlier_threshold": None,
+        "spots": spots,
+    }
+
+
+def _paper(fit: PaperFit, ids: Sequence[str]) -> dict[str, Any]:
+    def names(rows: Sequence[int]) -> list[str]:
+        return [ids[row] for row in rows]
+
+    runner_up = fit.runner_up
+    return {
+        "tau": fit.tau,
+        "n_min": fit.n_min,
+        "subset_size": fit.subset_size,
+        "score": fit.score,
+        "subset": names(fit.subset),
+        "inliers": names(fit.inliers),
+        "dropped": names(fit.dropped),
+        "subset_beyond_tau": names(fit.beyond),
+        "d_n": fit.d_n,
+        "delta": dict(zip(ids, fit.delta.tolist(), strict=True)),
+        "subsets": {
+            "tried": fit.n_subsets,
+            "all": fit.exhaustive,
+            "on_a_line": fit.n_degenerate,
+            "qualified": fit.n_qualified,
+        },
+        "runner_up": None
+        if runner_up is None
+        else {
+            "rank": runner_up.rank,
+            "subset": names(runner_up.subset),
+            "dropped": names(runner_up.dropped),
+            "d_n": runner_up.d_n,
+        },
+    }
+
+
+def _matching(match: IdMatch) -> dict[str, Any]:
+    pairs = zip(match.ids, match.reference_ids, match.rules, strict=True)
+    return {
+        "by": "geometry" if PLACE in match.rules else "id",
+        "not_equal_names": [
+            {"id": own, "reference_id": other, "rule": rule} for own, other, rule in pairs if rule != EXACT
+        ],
+    }
+
+
 def _transform(fit: SpotFit) -> dict[str, Any]:
-    rotation = fit.calibration.rotation
+    rotation = fit.model.rotation
     sure = fit.uncertainty
     return {
         "rotation": rotation.tolist(),
-        "translation": fit.calibration.translation.tolist(),
+        "translation": fit.model.translation.tolist(),
         "abc": abc_from_rotation(Rotation.from_matrix(rotation)).tolist(),
         "covariance": sure.covariance.tolist(),
         "centroid": sure.centroid.tolist(),
@@ -90,7 +201,7 @@ def _transform(fit: SpotFit) -> dict[str, Any]:
 
 
 def _spots(fit: SpotFit) -> list[dict[str, Any]]:
-    points, turned = fit.calibration.predict(fit.source, fit.source_rotations)
+    points, turned = fit.model.predict(fit.source, fit.source_rotations)
     angles = None if turned is None else abc_from_rotation(turned)
     residuals = fit.robust.rigid.residuals
     as_found, before, after = (np.linalg.norm(v, axis=1) for v in (fit.as_found, fit.before.residuals, residuals))

@@ -10,9 +10,11 @@ import numpy as np
 
 from respot import __version__
 from respot.calibration.calibration import Frame, Kind
-from respot.calibration.fit import SpotFit, fit_tables
+from respot.calibration.fit import fit_tables
+from respot.calibration.spot_fit import Method, SpotFit
 from respot.issues import BadInputError, Issue
 from respot.registration.errors import RegistrationError
+from respot.registration.matching import Matching
 from respot.spots import Source, read_source
 
 #: At most this many spots are listed one by one in issues.
@@ -37,6 +39,16 @@ class FitOptions:
         Known standard deviation of the reference per coordinate, mm.
     seed : int
         Of everything that is drawn.
+    method : str
+        ``"robust"``, ``"paper"`` or ``"affine"``.
+    tau : float, optional
+        Of the method "paper": largest residual of an inlier by its largest coordinate, mm.
+    n_min : int, optional
+        Of the method "paper": a subset qualifies with more inliers than this outside of it.
+    match : str
+        ``"auto"``, ``"id"`` or ``"geometry"``: how spots are paired.
+    profiles : sequence of Path
+        A plant's instruction forms.
     """
 
     kind: Kind = "theory"
@@ -45,6 +57,11 @@ class FitOptions:
     spot_id: str | None = None
     noise: float | None = None
     seed: int = 0
+    method: Method = "robust"
+    tau: float | None = None
+    n_min: int | None = None
+    match: Matching = "auto"
+    profiles: Sequence[Path] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,8 +92,8 @@ def fit_source(source_path: Path, reference_path: Path, options: FitOptions) -> 
     BadInputError
         The source or reference cannot be used, or they do not determine a transform.
     """
-    reference = read_source(reference_path, spot_id=options.spot_id)
-    source = read_source(source_path, reference.spots.ids, options.spot_id, options.robot_name)
+    reference = read_source(reference_path, spot_id=options.spot_id, profiles=options.profiles)
+    source = read_source(source_path, reference.spots.ids, options.spot_id, options.robot_name, options.profiles)
     for side, path in ((source, source_path), (reference, reference_path)):
         if not side.spots.ids:
             detail = f": {side.spots.issues[0]}" if side.spots.issues else "; --spot-id REGEX tells how they are named"
@@ -92,6 +109,10 @@ def fit_source(source_path: Path, reference_path: Path, options: FitOptions) -> 
             source_rotations=source.spots.rotations,
             noise=options.noise,
             seed=options.seed,
+            method=options.method,
+            tau=options.tau,
+            n_min=options.n_min,
+            matching=options.match,
             provenance={
                 "version": __version__,
                 "source": str(source_path),
@@ -117,18 +138,74 @@ def _advice(error: RegistrationError, source: Source, reference: Source) -> str:
 def _fit_issues(fit: SpotFit, source: Source, reference: Source) -> list[Issue]:
     issues: list[Issue] = []
     if fit.match is not None:
+        issues += [Issue(note.code, note.message, str(reference.path)) for note in fit.notes]
+        issues += _renamed(fit, source, reference)
         issues += _listed("UNMATCHED_SOURCE", fit.match.missing, f"not in {reference.path}", source.path)
         issues += _listed("UNMATCHED_REFERENCE", fit.match.extra, f"not in {source.path}", reference.path)
-    for effect in fit.effects:
+    issues += _paper_issues(fit)
+    for effect in (fit.beside or fit).effects:
         if effect.name == "swapped_ids":
             names = ", ".join(str(name) for name in effect.where["ids"])
             issues.append(Issue("EXCHANGED_NAMES", f"{names} carry each other's names in one of the two lists"))
+    if fit.method == "affine":
+        issues.append(
+            Issue("NOT_RIGID", "12 free parameters are for comparison only: no calibration, nothing to convert by")
+        )
     if not fit.support.supported:
         issues.append(Issue("ROTATION_NOT_SUPPORTED", fit.support.verdict))
     errors = np.linalg.norm(fit.robust.rigid.residuals, axis=1)
     for name, inlier, error in zip(fit.ids, fit.robust.inliers, errors, strict=True):
         if not inlier:
             issues.append(Issue("OUTLIER", f"{name} is {error:.2f} mm from where the model puts it"))
+    return issues
+
+
+def _renamed(fit: SpotFit, source: Source, reference: Source) -> list[Issue]:
+    """Spots without a partner that lie where the other list has one without a partner: probably renamed."""
+    assert fit.match is not None  # noqa: S101 - only called where two lists were paired
+    own = [row for row, name in enumerate(source.spots.ids) if name in set(fit.match.missing)]
+    other = [row for row, name in enumerate(reference.spots.ids) if name in set(fit.match.extra)]
+    if not own or not other:
+        return []
+    model = fit.beside or fit
+    images = model.robust.rigid.predict(source.spots.positions[own])
+    apart = np.linalg.norm(images[:, None, :] - reference.spots.positions[other][None, :, :], axis=-1)
+    near = apart <= model.robust.threshold
+    pairs = [
+        f"{source.spots.ids[own[i]]} = {reference.spots.ids[other[j]]} ({apart[i, j]:.2f} mm)"
+        for i, j in np.argwhere(near)
+        if near[i].sum() == 1 and near[:, j].sum() == 1
+    ]
+    if not pairs:
+        return []
+    shown = ", ".join(pairs[:_MOST_LISTED]) + (
+        f" and {len(pairs) - _MOST_LISTED} more" if len(pairs) > _MOST_LISTED else ""
+    )
+    message = (
+        f"without a partner by name and at the same place, so probably renamed: {shown}; they took no part in the fit"
+    )
+    return [Issue("PROBABLY_RENAMED", message, str(reference.path))]
+
+
+def _paper_issues(fit: SpotFit) -> list[Issue]:
+    """What the paper's method cannot see by itself."""
+    if fit.paper is None or fit.beside is None:
+        return []
+    issues = []
+    if fit.paper.beyond:
+        names = ", ".join(fit.ids[row] for row in fit.paper.beyond)
+        message = (
+            f"{names} lie beyond tau and are still part of the subset that made the transform: it never tests its own"
+        )
+        issues.append(Issue("SUBSET_NOT_TESTED", message))
+    other = fit.paper_mean_square
+    if other is not None and other.dropped != fit.paper.dropped:
+        names = ", ".join(fit.ids[row] for row in other.dropped) or "no spot"
+        issues.append(Issue("PAPER_AMBIGUOUS", f"D_n as a mean square, the other way to read it, drops {names}"))
+    apart = np.linalg.norm(fit.calibrated - fit.beside.calibrated, axis=1)
+    worst = int(np.argmax(apart))
+    message = f"the paper's transform and ours put {fit.ids[worst]} up to {apart[worst]:.2f} mm apart"
+    issues.append(Issue("PAPER_COMPARED", message))
     return issues
 
 

@@ -27,7 +27,7 @@ class TransformUncertainty:
     covariance : (6, 6) array
         Of tx, ty, tz [mm] and rx, ry, rz [deg].
     centroid : (3,) array
-        Mean of the calibrated inliers, reference frame [mm].
+        Mean of the calibrated spots that the transform was fitted to, reference frame [mm].
     sigma : float
         Noise per coordinate, sqrt(SSR / (3n - 6)) [mm].
     degrees_of_freedom : int
@@ -43,7 +43,7 @@ class TransformUncertainty:
     half_width: Array
 
 
-def transform_uncertainty(points: Array, residuals: Array) -> TransformUncertainty:
+def transform_uncertainty(points: Array, residuals: Array, fitted: Array | None = None) -> TransformUncertainty:
     """Uncertainty of the least-squares rigid transform, for noise that is the same along all axes.
 
     Parameters
@@ -51,11 +51,13 @@ def transform_uncertainty(points: Array, residuals: Array) -> TransformUncertain
     points : (n, 3) array, n >= 3
         Calibrated inliers, reference frame [mm].
     residuals : (n, 3) array
-        Their residuals [mm].
+        Their residuals under the least-squares fit of all of them [mm].
+    fitted : (m, 3) array, optional
+        Calibrated spots that the transform was fitted to, where these are others than ``points`` [mm].
     """
     free = 3 * len(points) - 6
     variance = float(np.sum(residuals**2)) / free
-    covariance, centroid = unit_covariance(points)
+    covariance, centroid = unit_covariance(points if fitted is None else fitted)
     units = np.array([1.0, 1.0, 1.0, 180.0 / np.pi, 180.0 / np.pi, 180.0 / np.pi])
     covariance = variance * covariance * np.outer(units, units)
     half_width = float(stats.t.ppf(0.975, free)) * np.sqrt(np.diag(covariance))

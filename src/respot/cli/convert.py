@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -30,10 +31,15 @@ def run(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="New folder for the backup.", show_default=False)
     ] = None,
+    method: options.MethodOption = "robust",
+    tau: options.Tau = None,
+    n_min: options.NMin = None,
+    match: options.Match = "auto",
     frame: options.FrameOption = None,
     robot_name: options.RobotName = None,
     robot: options.RobotModel = None,
     spot_id: options.SpotId = None,
+    profile: options.Profiles = None,
     noise: options.Noise = None,
     programs: Annotated[
         str | None, typer.Option("--programs", help="Glob of the programs in scope.", show_default=False)
@@ -61,16 +67,30 @@ def run(
         from respot.correction.options import CorrectionOptions
         from respot.kinematics.robot_file import robot_of
 
+        if method == "affine":
+            message = (
+                "--method affine stretches and shears the part: 12 free parameters are no rigid motion, and no program "
+                "may be corrected by them; use --method robust, or fit --method affine to look at them"
+            )
+            raise BadInputError("BAD_OPTION", message)
         model = None if robot is None else robot_of(robot)
         chosen = CorrectionOptions(programs, shift_limits(max_shift), keep_config, partial, templates, model)
         if calibration is not None:
             if theory or measured:
                 raise BadInputError("BAD_OPTION", "give either -c CAL.json or a reference to fit to, not both")
+            if (method, tau, n_min, match) != ("robust", None, None, "auto"):
+                message = (
+                    "--method, --tau, --n-min and --match belong to a fit; the calibration of -c is fitted already"
+                )
+                raise BadInputError("BAD_OPTION", message)
             from respot.calibration.source_fit import FitOptions
 
             fit_options, reference = FitOptions(robot_name=robot_name, spot_id=spot_id), None
         else:
-            reference, fit_options = reference_of(theory, measured, frame, robot_name, spot_id, noise, seed)
+            reference, fit_options = reference_of(
+                theory, measured, frame, robot_name, spot_id, noise, seed, method, tau, n_min, match
+            )
+        fit_options = replace(fit_options, profiles=tuple(profile or ()))
         return convert_to(source, reference, calibration, fit_options, chosen, output, dry_run, force, tolerance)
 
     run_command(work, as_json, strict)

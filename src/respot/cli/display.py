@@ -48,6 +48,27 @@ def line(text: str = "") -> None:
     typer.echo(printable(text))
 
 
+Branches = Sequence["str | tuple[str, Branches]"]
+
+
+def tree(title: str, branches: Branches) -> None:
+    """Print a tree: each branch is a text, or a text with branches of its own."""
+    from rich.console import Console
+    from rich.text import Text
+    from rich.tree import Tree
+
+    def grow(parent: Tree, children: Branches) -> None:
+        for child in children:
+            text, below = (child, ()) if isinstance(child, str) else child
+            grow(parent.add(Text(printable(text))), below)
+
+    root = Tree(
+        Text(printable(title), style="bold" if is_terminal() else ""), guide_style="dim" if is_terminal() else ""
+    )
+    grow(root, branches)
+    Console(width=terminal_width(), soft_wrap=not is_terminal()).print(root)
+
+
 def table(columns: Sequence[Column], rows: Sequence[Sequence[str]], marked: Sequence[bool] = ()) -> None:
     """Print a table; marked rows stand out on a terminal."""
     if is_terminal():

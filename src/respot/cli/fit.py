@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -13,7 +14,10 @@ from respot.cli.outcome import run as run_command
 from respot.issues import BadInputError
 
 if TYPE_CHECKING:
+    from respot.calibration.calibration import Kind
     from respot.calibration.source_fit import FitOptions
+    from respot.calibration.spot_fit import Method
+    from respot.registration.matching import Matching
 
 HELP = "Fit the spots of a backup to a reference, say what is left and why."
 
@@ -25,9 +29,14 @@ def run(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Save the calibration as JSON.", show_default=False)
     ] = None,
+    method: options.MethodOption = "robust",
+    tau: options.Tau = None,
+    n_min: options.NMin = None,
+    match: options.Match = "auto",
     frame: options.FrameOption = None,
     robot_name: options.RobotName = None,
     spot_id: options.SpotId = None,
+    profile: options.Profiles = None,
     noise: options.Noise = None,
     tolerance: options.Tolerance = 10.0,
     seed: options.Seed = 0,
@@ -42,7 +51,12 @@ def run(
         from respot.calibration.source_fit import fit_source
         from respot.cli.show_fit import show_fit
 
-        reference, chosen = reference_of(theory, measured, frame, robot_name, spot_id, noise, seed)
+        reference, chosen = reference_of(
+            theory, measured, frame, robot_name, spot_id, noise, seed, method, tau, n_min, match
+        )
+        if output is not None and method == "affine":
+            message = "--method affine is for comparison only and makes no calibration to save: leave -o out"
+            raise BadInputError("BAD_OPTION", message)
         if output is not None and output.exists() and not force:
             raise BadInputError(
                 "OUTPUT_EXISTS", "exists; name another file with -o, or replace it with --force", str(output)
@@ -50,13 +64,14 @@ def run(
         if output is not None and any(holds(path, output) for path in (source, reference)):
             message = "lies in the source or the reference; name another file with -o"
             raise BadInputError("OUTPUT_EXISTS", message, str(output))
-        fitted = fit_source(source, reference, chosen)
+        fitted = fit_source(source, reference, replace(chosen, profiles=tuple(profile or ())))
         if output is not None:
             try:
                 fitted.fit.calibration.save(output)
             except OSError as error:
                 raise BadInputError("CANNOT_READ", f"cannot be written: {error.strerror}", str(output)) from error
-        data = {**report(fitted.fit), "calibration_hash": fitted.fit.calibration.content_hash}
+        content_hash = None if method == "affine" else fitted.fit.calibration.content_hash
+        data = {**report(fitted.fit), "calibration_hash": content_hash}
         return Outcome("fit", data, lambda: show_fit(fitted, tolerance, output), list(fitted.issues))
 
     run_command(work, as_json, strict)
@@ -76,13 +91,18 @@ def reference_of(
     spot_id: str | None,
     noise: float | None,
     seed: int,
+    method: str = "robust",
+    tau: float | None = None,
+    n_min: int | None = None,
+    match: str = "auto",
 ) -> tuple[Path, FitOptions]:
     """Return the reference and the options of a fit.
 
     Raises
     ------
     BadInputError
-        Not exactly one of ``--theory`` and ``--measured``, or an unknown frame.
+        Not exactly one of ``--theory`` and ``--measured``, an unknown frame, method or way to match, or an option of a
+        method that was not asked for.
     """
     from respot.calibration.source_fit import FitOptions
 
@@ -92,4 +112,15 @@ def reference_of(
     frames: dict[str | None, Literal["same", "free"] | None] = {None: None, "same": "same", "free": "free"}
     if frame not in frames:
         raise BadInputError("BAD_OPTION", f"--frame is same or free, not {frame}")
-    return reference, FitOptions("theory" if theory else "measured", frames[frame], robot_name, spot_id, noise, seed)
+    methods: dict[str, Method] = {"robust": "robust", "paper": "paper", "affine": "affine"}
+    if method not in methods:
+        raise BadInputError("BAD_OPTION", f"--method is robust, paper or affine, not {method}")
+    if method != "paper" and (tau is not None or n_min is not None):
+        raise BadInputError("BAD_OPTION", "--tau and --n-min belong to the paper's method: add --method paper")
+    ways: dict[str, Matching] = {"auto": "auto", "id": "id", "geometry": "geometry"}
+    if match not in ways:
+        raise BadInputError("BAD_OPTION", f"--match is auto, id or geometry, not {match}")
+    kind: Kind = "theory" if theory else "measured"
+    return reference, FitOptions(
+        kind, frames[frame], robot_name, spot_id, noise, seed, methods[method], tau, n_min, ways[match]
+    )

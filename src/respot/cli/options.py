@@ -43,9 +43,42 @@ SpotId = Annotated[
     str | None,
     typer.Option("--spot-id", help="Regular expression for the spot ID in a target's name.", show_default=False),
 ]
+Profiles = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--profile",
+        help="TOML file with the instruction forms and spot names of a plant; may repeat.",
+        show_default=False,
+    ),
+]
 Noise = Annotated[
     float | None,
     typer.Option("--noise", min=0.0, help="Known noise of the reference per coordinate, mm.", show_default=False),
+]
+MethodOption = Annotated[
+    str,
+    typer.Option(
+        "--method", help="robust, paper (the paper's own method) or affine (12 free parameters, for comparison only)."
+    ),
+]
+Tau = Annotated[
+    float | None,
+    typer.Option(
+        "--tau",
+        help="Of --method paper: largest coordinate difference of an inlier, mm (default 10).",
+        show_default=False,
+    ),
+]
+NMin = Annotated[
+    int | None,
+    typer.Option(
+        "--n-min",
+        help="Of --method paper: a subset counts with more inliers than this outside of it (default half of them).",
+        show_default=False,
+    ),
+]
+Match = Annotated[
+    str, typer.Option("--match", help="How spots are paired: auto, id (by name) or geometry (names play no part).")
 ]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything that is drawn.")]
 Tolerance = Annotated[float, typer.Option("--tolerance", min=0.0, help="Tolerance of a spot, mm.")]

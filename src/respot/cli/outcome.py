@@ -22,6 +22,9 @@ from respot.issues import BadInputError, Issue, Level, has_errors
 DONE, NO, BAD_INPUT, INTERNAL, INTERRUPTED = 0, 1, 2, 3, 130
 #: Issues of one code that are written in full; the rest are counted.
 _MOST_OF_A_CODE = 10
+#: JSON values below this level stand on one line, however long; others if they are short.
+_DEEPEST = 4
+_LONGEST_LINE = 160
 
 
 @dataclass
@@ -57,12 +60,42 @@ class Outcome:
                 "issues": [issue.as_json() for issue in self.issues],
                 **self.data,
             }
-            typer.echo(printable(json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False)))
+            typer.echo(printable(json_text(record)))
         else:
             self.show()
             say(self.issues)
         if self.answer_is_no or (strict and has_errors(self.issues)):
             raise typer.Exit(NO)
+
+
+def json_text(value: object, level: int = 0) -> str:
+    """JSON for people and programs: the outer levels indented, each record of a list on a line of its own."""
+    short = json.dumps(value, ensure_ascii=False, allow_nan=False) if level >= _DEEPEST or _is_plain(value) else None
+    if short is not None and (level >= _DEEPEST or len(short) <= _LONGEST_LINE):
+        return short
+    pad = "  " * (level + 1)
+    if isinstance(value, dict):
+        rows = [
+            f"{json.dumps(str(name), ensure_ascii=False)}: {json_text(item, level + 1)}" for name, item in value.items()
+        ]
+        brackets = "{}"
+    elif isinstance(value, list | tuple):
+        rows, brackets = [json_text(item, level + 1) for item in value], "[]"
+    else:
+        return json.dumps(value, ensure_ascii=False, allow_nan=False)
+    inner = ",".join(f"\n{pad}{row}" for row in rows)
+    return f"{brackets[0]}{inner}\n{'  ' * level}{brackets[1]}"
+
+
+def _is_plain(value: object) -> bool:
+    """Whether a value holds at most containers of plain values: what can be read on one line."""
+    items = value.values() if isinstance(value, dict) else value if isinstance(value, list | tuple) else ()
+    return all(not isinstance(item, dict | list | tuple) or _is_flat(item) for item in items)
+
+
+def _is_flat(value: dict[str, object] | list[object] | tuple[object, ...]) -> bool:
+    items = value.values() if isinstance(value, dict) else value
+    return len(value) <= _LONGEST_LINE and not any(isinstance(item, dict | list | tuple) for item in items)
 
 
 def printable(text: str) -> str:

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from respot.cli.display import Column, heading, line, table, terminal_width
+from respot.cli.show_method import show_affine, show_paper
 from respot.languages import LANGUAGES
+from respot.registration.matching import PLACE
 
 if TYPE_CHECKING:
-    from respot.calibration.fit import SpotFit
     from respot.calibration.source_fit import SourceFit
+    from respot.calibration.spot_fit import SpotFit
     from respot.geometry import Array
     from respot.spots import Source
 
@@ -23,14 +25,19 @@ _COORDINATES, _EVERYTHING = 124, 150
 def show_fit(fitted: SourceFit, tolerance: float, saved: Path | None = None) -> None:
     """Print a fit: spots, errors, transform, what was found."""
     fit = fitted.fit
-    kind = "should be" if fit.calibration.kind == "theory" else "really went"
+    kind = "should be" if fit.model.kind == "theory" else "really went"
     heading(f"{describe(fitted.source)} against {fitted.reference.path} (where it {kind})")
+    matched = "geometry" if fit.match is not None and PLACE in fit.match.rules else "ID"
     counts = f"{len(fitted.source.spots.ids)} spots in the source, {len(fitted.reference.spots.ids)} in the reference"
-    line(f"{counts}, {len(fit.ids)} matched by ID, {int(fit.robust.inliers.sum())} inliers")
+    line(f"{counts}, {len(fit.ids)} matched by {matched}, {int(fit.robust.inliers.sum())} inliers")
+    if fit.method == "affine":
+        show_affine(fit)
     line()
     _show_spots(fit)
     _show_errors(fit, tolerance)
     _show_transform(fit)
+    if fit.method == "paper":
+        show_paper(fit)
     _show_found(fit)
     if saved is not None:
         line(f"\nsaved {saved}")
@@ -51,7 +58,7 @@ def _show_spots(fit: SpotFit) -> None:
     calibrated, as_found = fit.calibrated, np.linalg.norm(fit.as_found, axis=1)
     after = np.linalg.norm(fit.robust.rigid.residuals, axis=1)
     columns = [Column("spot", number=False)]
-    columns += [Column("theoretical x, y, z" if fit.calibration.kind == "theory" else "measured x, y, z")] * wide
+    columns += [Column("theoretical x, y, z" if fit.model.kind == "theory" else "measured x, y, z")] * wide
     columns += [Column("actual x, y, z")] * wide + [Column("as found")]
     columns += [Column("calibrated x, y, z")] * wide
     columns += [Column("after")] + [Column(title) for title in ("dx", "dy", "dz")] * components
@@ -67,8 +74,8 @@ def _show_spots(fit: SpotFit) -> None:
         cells += ["yes" if fit.robust.inliers[row] else "no"]
         rows.append(cells)
     table(columns, rows, marked=[bool(value) for value in fit.repaired])
-    for name, other in zip(fit.ids, fit.reference_ids, strict=True):
-        if name != other:
+    for name, other, repaired in zip(fit.ids, fit.reference_ids, fit.repaired, strict=True):
+        if repaired:
             line(f"* {name} lies at the place that the reference calls {other}; 'as found' takes the names as given")
 
 
@@ -80,14 +87,24 @@ def _show_errors(fit: SpotFit, tolerance: float) -> None:
     heading("errors [mm]")
     rigid, inliers = fit.robust.rigid.residuals, fit.robust.inliers
     kept = "names exchanged back" if fit.repaired.any() else "names as given"
+    after = "the paper's transform" if fit.method == "paper" else "rigid"
     rows = [
         _errors("as found, no transform", fit.as_found),
         _errors("before: rigid, all spots, names as given", fit.before.residuals),
-        _errors(f"after: rigid, {int(inliers.sum())} inliers, {kept}", rigid[inliers]),
+        _errors(f"after: {after}, {int(inliers.sum())} inliers, {kept}", rigid[inliers]),
         _errors("leave-one-out before", fit.before_loo),
         _errors("leave-one-out after", fit.after_loo),
         _errors("for comparison: translation alone", fit.translation.residuals),
     ]
+    if fit.method == "paper" and fit.beside is not None:
+        ours = fit.beside
+        names = "names exchanged back" if ours.repaired.any() else "names as given"
+        rows.append(
+            _errors(
+                f"for comparison: robust, {int(ours.robust.inliers.sum())} inliers, {names}",
+                ours.robust.rigid.residuals[ours.robust.inliers],
+            )
+        )
     if fit.affine is not None:
         rows.append(_errors("for comparison: 12 free parameters, names as given", fit.affine.residuals))
     table([Column("", number=False), Column("RMS"), Column("mean"), Column("max"), Column("n")], rows)
@@ -107,7 +124,7 @@ def _show_transform(fit: SpotFit) -> None:
     heading("transform, source to reference (95 % intervals)")
     inliers = fit.robust.inliers
     moved = (fit.calibrated[inliers] - fit.source[inliers]).mean(axis=0)
-    turned = np.degrees(fit.calibration.source2reference.rotation.as_rotvec())
+    turned = np.degrees(fit.model.source2reference.rotation.as_rotvec())
     half = fit.uncertainty.half_width
     for name, value, width in zip("xyz", moved, half[:3], strict=True):
         line(f"  the spots' centre moves in {name} by {value:8.3f} +- {width:.3f} mm")
@@ -118,10 +135,11 @@ def _show_transform(fit: SpotFit) -> None:
 
 def _show_found(fit: SpotFit) -> None:
     heading("what is left, and why")
-    for effect in fit.effects:
+    effects = (fit.beside or fit).effects
+    for effect in effects:
         word = "named" if effect.named else "consistent with"
         line(f"  {effect.name} ({word}): {effect.remedy.text}")
-    if not fit.effects:
+    if not effects:
         line("  no effect found beyond the rigid transform")
     sd = fit.directions.sd_xyz
     axis = fit.directions.axes[int(np.argmax(fit.directions.sd))]

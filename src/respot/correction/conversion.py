@@ -16,6 +16,7 @@ from respot.calibration.source_fit import FitOptions, SourceFit, fit_source
 from respot.correction.correction import Correction, align
 from respot.correction.options import CorrectionOptions
 from respot.issues import BadInputError, Issue
+from respot.languages import LANGUAGES
 from respot.program.moves import Move
 from respot.program.robot import Robot
 from respot.spots import Source, read_source
@@ -131,7 +132,7 @@ def convert(
     else:
         assert calibration is not None  # noqa: S101 - the command line asks for one of both
         fitted, model = None, _load(calibration)
-        read = read_source(source, model.ids, fit_options.spot_id, fit_options.robot_name)
+        read = read_source(source, model.ids, fit_options.spot_id, fit_options.robot_name, fit_options.profiles)
         issues, ids = read.issues, model.ids
     if read.robot is None:
         raise BadInputError("NO_ROBOT", "is a table: only a backup or a program can be converted", str(source))
@@ -147,7 +148,8 @@ def convert(
         detail = f": {read.spots.issues[0]}" if read.spots.issues else ""
         message = f"holds none of the spots that the calibration was fitted to{detail}"
         raise BadInputError("NO_COMMON_IDS", message, str(source))
-    correction = align(read.robot, model.source2reference, model.content_hash, moves, options)
+    language = LANGUAGES[read.robot.language].with_plant(read.backup.profiles if read.backup is not None else ())
+    correction = align(read.robot, language, model.source2reference, model.content_hash, moves, options)
     refused = [
         Issue(refusal.code, f"{refusal.target}: {refusal.message}", refusal.path, refusal.line)
         for refusal in correction.refused

@@ -104,6 +104,7 @@ class Correction:
 
 def align(
     robot: Robot,
+    language: Language,
     source2reference: RigidTransform,
     calibration_hash: str,
     spot_moves: Sequence[Move],
@@ -115,6 +116,8 @@ def align(
     ----------
     robot : Robot
         The robot.
+    language : Language
+        Its language, with the instruction forms that the robot was read with.
     source2reference : RigidTransform
         The model.
     calibration_hash : str
@@ -129,10 +132,9 @@ def align(
     BadInputError
         ``ALREADY_APPLIED`` if a file's header names this calibration.
     """
-    language = LANGUAGES[robot.language]
     _refuse_twice(robot, calibration_hash)
     _check_options(robot, options)
-    scope = find_scope(robot, language, spot_moves, options.programs)
+    scope = find_scope(robot, spot_moves, options.programs)
     after = {id(moving): new_pose(moving, source2reference) for moving in scope.moving}
     moving = [item for item in scope.moving if _moves(item, after[id(item)])]
     refused = [*scope.refusals, *_too_far(moving, after, options)]
@@ -301,9 +303,8 @@ def _edits(
             text = robot.files[item.target.path].source.text
             edits.append(point_edit(item, after[id(item)], configured.get(id(item), {}), text, language, made))
     for move in scope.offsets:
-        if not kept((move.program,), str(move.target)) and move.offset is not None and move.base is not None:
-            assert move.base.pose is not None  # noqa: S101
-            values = new_offset(move.offset, move.base.pose, source2reference)
+        if not kept((move.program,), str(move.target)) and move.offset is not None and move.base2spots is not None:
+            values = new_offset(move.offset, move.base2spots, source2reference)
             edits.append(offset_edit(move, values, robot.files[move.offset.path].source.text, made))
     return [edit for edit in edits if edit is not None]
 
@@ -366,9 +367,9 @@ def _issues(
 
 def _extrapolated(moving: Sequence[Moving], spot_moves: Sequence[Move]) -> list[Issue]:
     """One issue for all moved targets outside the hull of the fitted spots."""
-    spots = np.array([world.translation for move in spot_moves if (world := move.world) is not None]).reshape(-1, 3)
-    worlds = [world for item in moving if (world := item.moves[0].world) is not None]
-    points = np.array([world.translation for world in worlds]).reshape(-1, 3)
+    spots = np.array([pose.translation for move in spot_moves if (pose := move.spot_pose) is not None]).reshape(-1, 3)
+    poses = [pose for item in moving if (pose := item.moves[0].spot_pose) is not None]
+    points = np.array([pose.translation for pose in poses]).reshape(-1, 3)
     if not len(points) or not len(spots):
         return []
     outside = ~_inside(spots, points)

@@ -151,10 +151,10 @@ class Places:
             return None
         if move.offset is None:
             return _Posed(move, target, own, before, after)
-        if move.base is None or move.base.pose is None:
+        if move.base2spots is None:
             return None
         old = np.array([0.0 if number is None else float(number.value) for number in move.offset.numbers])
-        turned = new_offset(move.offset, move.base.pose, self._correction)
+        turned = new_offset(move.offset, move.base2spots, self._correction)
         return _Posed(move, target, own, _shifted(before, old), _shifted(after, turned))
 
     def _solve(self, posed: Sequence[_Posed]) -> None:

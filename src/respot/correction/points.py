@@ -1,7 +1,8 @@
 """Depth `points`: every moved target gets the numbers of its new pose, in its own base.
 
 With G = source2reference and B = base2world, the TCP must come to G B T; the target becomes T' = B^-1 G B T. An offset
-d along the base becomes R(B)^-1 R(G) R(B) d, so that B (T' + d') = G B (T + d).
+d along the base becomes R(B)^-1 R(G) R(B) d, so that B (T' + d') = G B (T + d). With an external TCP the spots are
+compared in the part frame, in which the targets are programmed: B is one, and T' = G T (DESIGN section 5, P' = D P).
 """
 
 from __future__ import annotations
@@ -71,8 +72,8 @@ def moves_at_all(before: RigidTransform, after: RigidTransform) -> bool:
 
 def new_pose(moving: Moving, source2reference: RigidTransform) -> RigidTransform:
     """Return the new ``target2base`` of a target."""
-    assert moving.base.pose is not None and moving.target.pose is not None  # noqa: S101 - scope refuses both
-    return in_base(moving.base.pose, source2reference) * moving.target.pose
+    assert moving.target.pose is not None  # noqa: S101 - scope refuses it
+    return in_base(moving.base2spots, source2reference) * moving.target.pose
 
 
 def printed_pose(target: Target, after: RigidTransform, text: str, language: Language) -> RigidTransform:

@@ -40,7 +40,12 @@ def prove(correction: Correction, old: Mapping[str, bytes], new: Mapping[str, by
     if set(old) != set(new) or changed - set(correction.files):
         stray = sorted((set(old) ^ set(new)) | (changed - set(correction.files)))
         raise VerifyError(f"{stray[0]}: is not as it was, though nothing of it should change")
-    robot = correction.language.read_robot(correction.robot.name, correction.robot.root, new)
+    robots = correction.language.read_robots(
+        correction.robot.name, correction.robot.root, new, correction.language.forms
+    )
+    robot = next((found for found in robots if found.task == correction.robot.task), None)
+    if robot is None:
+        raise VerifyError(f"{correction.robot.name} is not found again in what was written")
     literals_before, literals_after = _literals(correction.robot), _literals(robot)
     for path in correction.files:
         before, after = literals_before.get(path, []), literals_after.get(path, [])

@@ -13,8 +13,9 @@ import fnmatch
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from scipy.spatial.transform import RigidTransform
+
 from respot.geometry import distance_mm, turn_deg
-from respot.languages import Language
 from respot.program.frames import Frame
 from respot.program.moves import Move
 from respot.program.robot import Robot, Routine
@@ -44,10 +45,10 @@ class Stay:
 
 @dataclass(frozen=True, eq=False)
 class Moving:
-    """A target that moves, with the base it is programmed in and all motions to it."""
+    """A target that moves, with its base as spots are compared (`Move.base2spots`) and all motions to it."""
 
     target: Target
-    base: Frame
+    base2spots: RigidTransform
     moves: Sequence[Move]
 
     @property
@@ -81,40 +82,37 @@ class Scope:
     refusals: list[Refusal] = field(default_factory=list)
 
 
-def find_scope(robot: Robot, language: Language, spot_moves: Iterable[Move], programs: str | None = None) -> Scope:
+def find_scope(robot: Robot, spot_moves: Iterable[Move], programs: str | None = None) -> Scope:
     """Decide about every target of a robot.
 
     Parameters
     ----------
     robot : Robot
         The robot.
-    language : Language
-        Its language.
     spot_moves : iterable of Move
         Motions of the matched spots.
     programs : str, optional
         Glob of programs to take in place of the routines with matched spots.
     """
     spots = list(spot_moves)
-    return _Finder(robot, language, spots, programs).find()
+    return _Finder(robot, spots, programs).find()
 
 
 class _Finder:
     """Decides, and takes in every routine that shares a target with those in scope."""
 
-    def __init__(self, robot: Robot, language: Language, spots: Sequence[Move], programs: str | None) -> None:
+    def __init__(self, robot: Robot, spots: Sequence[Move], programs: str | None) -> None:
         self._robot = robot
-        self._language = language
         held = {id(move) for move in spots}
         self._task_of = {id(move): routine.task for routine in robot.routines for move in routine.moves}
-        self._bases = [(self._task_of[id(move)], move.base) for move in spots if move.base is not None]
+        self._parts = [_Part(self._task_of[id(move)], move) for move in spots if move.workpiece is not None]
         self._welding = {id(r) for r in robot.routines if any(id(move) in held for move in r.moves)}
         self._core, self._wide = _routines(robot, self._welding, programs)
         self._everywhere: dict[int, list[Move]] = {}
         for move in robot.moves():
             if move.target is not None:
                 self._everywhere.setdefault(id(move.target), []).append(move)
-        self._found: dict[tuple[str, int], bool] = {}
+        self._found: dict[tuple[str, int, bool], bool] = {}
 
     def find(self) -> Scope:
         """Return the decision."""
@@ -152,21 +150,32 @@ class _Finder:
         return scope, uses
 
     def _is_service(self, routine: Routine) -> bool:
-        return id(routine) not in self._welding and self._language.forms.is_service(routine.name)
+        return id(routine) not in self._welding and routine.service
 
     def _moves(self, move: Move, routine: Routine) -> bool:
         if move.target is not None and move.target.kind is TargetKind.JOINTS:
             return False
-        if move.base is None or not self._is_matched(move.base, routine.task):
+        if not self._is_matched(move, routine.task):
             return False
-        return not (_is_world(move.base) and self._is_service(routine))
+        return move.external_tcp or not (_is_world(move.base) and self._is_service(routine))
 
-    def _is_matched(self, base: Frame, task: str) -> bool:
-        """Whether a matched spot of the task uses the base, under this or another name."""
-        key = (task, id(base))
+    def _is_matched(self, move: Move, task: str) -> bool:
+        """Whether a matched spot of the task uses the base, or is on the held part, under this or another name."""
+        frame = move.workpiece
+        if frame is None:
+            return False
+        key = (task, id(frame), move.external_tcp)
         if key not in self._found:
-            self._found[key] = any(task == other_task and _same(base, other) for other_task, other in self._bases)
+            self._found[key] = any(part.carries(task, frame, move.external_tcp) for part in self._parts)
         return self._found[key]
+
+    def _is_mixed(self, move: Move, task: str) -> bool:
+        """Whether a motion takes the frames of a matched spot the other way round (facts: krl.md 5, mixed modes)."""
+        spots = (part.move for part in self._parts if part.task == task)
+        return any(
+            spot.external_tcp != move.external_tcp and (_shared(spot.base, move.base) or _shared(spot.tool, move.tool))
+            for spot in spots
+        )
 
     def _refusal(self, move: Move, routine: Routine) -> Refusal | None:
         name = str(move.target) if move.target is not None else f"{move.instruction}@{move.line}"
@@ -178,21 +187,28 @@ class _Finder:
             return None
         if move.target is None and move.offset is None:
             return refuse("RUN_TIME_POSE", move.unknown) if move.unknown else None
-        if move.base is None:
-            return refuse("UNKNOWN_FRAME", move.unknown or "the program does not tell the base of this motion")
-        if move.base.pose is None:
+        if move.workpiece is None:
+            what = "what the robot holds" if move.external_tcp else "the base of this motion"
+            return refuse("UNKNOWN_FRAME", move.unknown or f"the program does not tell {what}")
+        if move.base2spots is None:
+            assert move.base is not None  # noqa: S101 - the base is what carries the part
             return refuse("UNKNOWN_FRAME", f"base {move.base}: {move.base.unknown}")
         elsewhere = id(routine) not in self._core or self._is_service(routine)
-        if _is_world(move.base) and not self._is_matched(move.base, routine.task) and not elsewhere:
+        in_world = not move.external_tcp and _is_world(move.base)
+        if in_world and not self._is_matched(move, routine.task) and not elsewhere:
             message = (
                 f"{move.routine} welds under other bases but goes to this target in the world frame: "
                 "respot cannot tell whether it belongs to the part"
             )
             return refuse("WORLD_BASE", message)
+        if self._is_mixed(move, routine.task):
+            message = (
+                "the matched spots use the same frames, but one of them with the gun and the other with the part on "
+                "the robot: both would have to move, each in its own way"
+            )
+            return refuse("EXTERNAL_TCP", message)
         if not self._moves(move, routine):
             return None
-        if move.external_tcp:
-            return refuse("EXTERNAL_TCP", "the robot holds the part; correcting such targets is not supported yet")
         if move.unknown:
             return refuse("RUN_TIME_POSE", move.unknown)
         if move.target is not None and move.target.pose is None:
@@ -209,27 +225,53 @@ class _Finder:
             scope.stays.append(Stay(target, "JOINT_TARGET"))
             return
         if not moves:
-            same_base = any(
-                move.base is not None and self._is_matched(move.base, self._task_of[id(move)]) for move in everywhere
-            )
+            same_base = any(self._is_matched(move, self._task_of[id(move)]) for move in everywhere)
             code = "SAME_BASE_STAYS" if same_base else "OUT_OF_SCOPE" if everywhere else "NOT_REACHED"
             scope.stays.append(Stay(target, code))
             return
-        base = moves[0].base
-        used = {id(move.base): move.base for move in everywhere}
-        if base is None or any(other is None or not _same(base, other) for other in used.values()):
-            names = " and ".join("an unknown base" if other is None else str(other) for other in used.values())
+        first = moves[0]
+        if not all(_same_use(first, other) for other in everywhere):
+            used = dict.fromkeys("an unknown base" if other.base is None else str(other.base) for other in everywhere)
+            kinds = {other.external_tcp for other in everywhere}
+            names = "held and external TCP" if len(kinds) > 1 else " and ".join(used)
             message = f"it is used under {names}: one literal cannot be right in both"
-            first = moves[0]
             refusal = Refusal(first.program, target.name, "SHARED_TARGET", message, first.path, first.line)
             scope.refusals.append(refusal)
             return
-        scope.moving.append(Moving(target, base, everywhere))
+        assert first.base2spots is not None  # noqa: S101 - refused above
+        scope.moving.append(Moving(target, first.base2spots, everywhere))
 
 
-def _is_world(base: Frame) -> bool:
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """The frame that carries the part of a matched spot."""
+
+    task: str
+    move: Move
+
+    def carries(self, task: str, frame: Frame, external_tcp: bool) -> bool:
+        own = self.move.workpiece
+        return self.task == task and external_tcp == self.move.external_tcp and own is not None and _same(frame, own)
+
+
+def _shared(first: Frame | None, second: Frame | None) -> bool:
+    """Whether two motions name the same frame, other than the world or the bare flange."""
+    return first is not None and second is not None and not first.world and _same(first, second)
+
+
+def _same_use(first: Move, second: Move) -> bool:
+    """Whether two motions mean the same place by one literal."""
+    if first is second:
+        return True
+    frames = first.workpiece, second.workpiece
+    if first.external_tcp != second.external_tcp or frames[0] is None or frames[1] is None:
+        return False
+    return _same(frames[0], frames[1])
+
+
+def _is_world(base: Frame | None) -> bool:
     """Whether a base is the world, by number or because nobody ever set it."""
-    return base.world or (not base.held and _same(base, Frame("world", world=True)))
+    return base is not None and (base.world or (not base.held and _same(base, Frame("world", world=True))))
 
 
 def _same(first: Frame, second: Frame) -> bool:

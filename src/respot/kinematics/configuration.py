@@ -18,17 +18,20 @@ from respot.geometry import Array
 from respot.kinematics import confdata, status_turn
 from respot.kinematics.cell import Reason, RobotCell
 from respot.kinematics.opw import OpwRobot
-from respot.kinematics.turns import TURNS, chosen_turn, nearest_turn, outside
+from respot.kinematics.path import singularity_distances
+from respot.kinematics.turns import ROUNDING, TURNS, chosen_turn, nearest_turn, outside
 
 Integers = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 
 #: A moved angle this near to a border keeps the old number if that is the one on the other side [deg; mm].
-KEEP = 1e-6
+KEEP = ROUNDING
 #: Taught points are printed with few digits: their joints may lie so far beyond a border of the old numbers [deg; mm].
 TAUGHT = 0.02
 #: The nominal joints of an absolutely accurate robot are not its joints; within this of a border they decide nothing.
 ACCURATE = 0.5
+#: No status, turn or quadrant is as large.
+NO_NUMBER = 1_000_000
 
 
 class Scheme(Protocol):
@@ -99,7 +102,7 @@ def taught_joints(
 ) -> tuple[Array, tuple[Reason | None, ...]]:
     """Joints (n, 6) [deg] of n taught points, and for each without joints the reason why none fits; NaN there."""
     refused = _refused(cell)
-    old = np.atleast_2d(np.asarray(configuration, dtype=np.int64))
+    old = _whole(configuration)
     if refused is not None or not isinstance(cell.model, OpwRobot):
         return np.full((len(old), 6), np.nan), (refused,) * len(old)
     return _taught(cell, cell.model, all_solutions(cell, cell.model, tool2world, tool2flange, len(old)), old)
@@ -125,12 +128,12 @@ def reconfigure(
         TCP poses in the world before and after, one or n; the new ones as they are printed. For an external TCP the
         gun.
     configuration : array_like of int
-        Old ``S, T`` (n, 2) or ``cf1, cf4, cf6, cfx`` (n, 4).
+        Old ``S, T`` (n, 2) or ``cf1, cf4, cf6, cfx`` (n, 4). What is no whole number fits no pose.
     new_tool2flange : RigidTransform, optional
         The same after the correction; without it the old one. For an external TCP the new target.
     """
     new_tool = tool2flange if new_tool2flange is None else new_tool2flange
-    old = np.atleast_2d(np.asarray(configuration, dtype=np.int64))
+    old = _whole(configuration)
     old_joints, reasons = taught_joints(cell, tool2flange, old_tool2world, old)
     joints, result = np.full((len(old), 6), np.nan), old.copy()
     rows = np.flatnonzero([reason is None for reason in reasons])
@@ -162,6 +165,13 @@ def _refused(cell: RobotCell) -> Reason | None:
     if cell.on_track:
         return Reason("CONFIG_NOT_CHECKED", f"{name} stands on an external axis: where its base is, is not known")
     return None
+
+
+def _whole(configuration: npt.ArrayLike) -> Integers:
+    """Configurations (n, k) as integers; a row with anything else becomes one that no pose has."""
+    numbers = np.atleast_2d(np.asarray(configuration, dtype=float))
+    whole = (np.abs(numbers) < NO_NUMBER) & (numbers == np.round(numbers))
+    return np.where(whole.all(axis=1, keepdims=True), numbers, -NO_NUMBER).astype(np.int64)
 
 
 def _accurate(cell: RobotCell, old: Integers) -> Bools:
@@ -202,12 +212,14 @@ def _taught(
     tolerance = np.where(_accurate(cell, old), ACCURATE, TAUGHT)[:, None, None]
     exists: Bools = np.asarray(np.isfinite(branches).all(axis=-1))
     fits = exists & scheme.posture_matches(model, branches, old, tolerance)
+    exactly = scheme.posture_matches(model, branches, old, np.zeros_like(tolerance))
     angles, turned = chosen_turn(
         branches[..., None] + TURNS, scheme.turn_matches(branches, old, tolerance), cell.limits
     )
     inside = (outside(angles, cell.limits) <= tolerance).all(axis=-1)
     usable = fits & turned.all(axis=-1) & inside
-    cost = np.where(usable, np.abs(angles).sum(axis=-1), np.inf)
+    # on both sides of a border a branch fits within the tolerance; the numbers say which side is meant
+    cost = np.where(usable, np.abs(angles).sum(axis=-1) + 1e6 * ~exactly, np.inf)
     best = np.argmin(cost, axis=1)
     joints = angles[np.arange(len(old)), best]
     reasons: list[Reason | None] = []
@@ -215,9 +227,12 @@ def _taught(
     for row in range(len(old)):
         reason = None
         if undefined[row] or not usable[row].any():
-            reason = _misfit(cell, scheme, old[row], branches[row])
+            untold = (_undetermined(model, solution, "taught") for solution in branches[row, fits[row]])
+            reason = next(filter(None, untold), None) or _misfit(cell, scheme, old[row], branches[row])
         elif model.coupled_23 and _differ(angles[row, usable[row]]):
             reason = _inconsistent(cell, f"{scheme.text(old[row])} fits several solutions of the taught pose")
+        else:
+            reason = _undetermined(model, joints[row], "taught")
         reasons.append(reason)
     joints[[reason is not None for reason in reasons]] = np.nan
     return joints, tuple(reasons)
@@ -225,6 +240,8 @@ def _taught(
 
 def _misfit(cell: RobotCell, scheme: Scheme, old: Integers, branches: Array) -> Reason:
     """Say why no solution (8, 6) of a taught point has its old numbers."""
+    if (old == -NO_NUMBER).any():
+        return _inconsistent(cell, "status, turn or confdata is not a whole number")
     shown = scheme.text(old)
     solutions = branches[np.isfinite(branches).all(axis=-1)]
     if not len(solutions):
@@ -239,6 +256,20 @@ def _misfit(cell: RobotCell, scheme: Scheme, old: Integers, branches: Array) -> 
 
 def _inconsistent(cell: RobotCell, message: str) -> Reason:
     return Reason("CONFIG_INCONSISTENT", f"{message} ({cell.model.name or 'robot'})")
+
+
+def _undetermined(model: OpwRobot, joints: Array, what: str) -> Reason | None:
+    """Say which axes a pose does not tell: with axis 5 straight 4 and 6 are one, below the wrist centre axis 1 is free.
+
+    The digits of a printed pose then turn them by any angle, and signs and quadrants mean nothing.
+    """
+    overhead, _, straight = singularity_distances(model, joints)[0]
+    text = ""
+    if straight <= TAUGHT:
+        text = f"axis 5 of the {what} pose stands at {joints[4]:.4f} deg: it does not tell axes 4 and 6 apart"
+    elif overhead <= TAUGHT:
+        text = f"the wrist centre of the {what} pose is {overhead:.4f} mm from axis 1: it does not tell axis 1"
+    return Reason("CONFIG_NOT_CHECKED", f"{text} ({model.name or 'robot'})") if text else None
 
 
 def _differ(solutions: Array) -> bool:
@@ -258,8 +289,8 @@ def nearest_inside(model: OpwRobot, branches: Array, old_joints: Array, limits: 
     if limits is None:
         return nearest_solution(model, branches, old_joints)
     turned = nearest_turn(branches, old_joints[:, None, :], model.revolute)
-    turned = np.where(turned > limits[:, 1], turned - 360.0 * model.revolute, turned)
-    turned = np.where(turned < limits[:, 0], turned + 360.0 * model.revolute, turned)
+    turned = np.where(turned > limits[:, 1] + ROUNDING, turned - 360.0 * model.revolute, turned)
+    turned = np.where(turned < limits[:, 0] - ROUNDING, turned + 360.0 * model.revolute, turned)
     allowed = (outside(turned, limits) == 0.0).all(axis=-1)
     inside = np.where(allowed[..., None], turned, np.nan)
     travel = np.linalg.norm(inside - old_joints[:, None, :], axis=-1)
@@ -282,6 +313,9 @@ def _unreached(
 
 def _objection(cell: RobotCell, model: OpwRobot, joints: Array, old_joints: Array, old: Integers) -> Reason | None:
     """Say why a moved target must not be written with these joints."""
+    undetermined = _undetermined(model, joints, "moved")
+    if undetermined is not None:
+        return undetermined
     beyond = outside(joints, cell.limits)
     if cell.limits is not None and beyond.max() > 0.0:
         axis = int(np.argmax(beyond))

@@ -74,7 +74,8 @@ class RobotModel(ABC):
             A joint is not finite, or there are not as many as axes.
         """
         matrices = self.run(joints).matrices
-        return RigidTransform.from_matrix(matrices[0] if np.ndim(joints) == 1 else matrices)
+        # products of rotations need not be made orthogonal, which takes as long as all the rest
+        return RigidTransform(matrices[0] if np.ndim(joints) == 1 else matrices, normalize=False, copy=False)
 
     @abstractmethod
     def inverse(self, poses: RigidTransform, near: npt.ArrayLike | None = None) -> Array:

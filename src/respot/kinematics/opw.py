@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 LENGTHS = ("a1", "a2", "b", "c1", "c2", "c3", "c4")
 #: A wrist centre that rounding puts this far outside the reach of a stretched arm is reached.
 BOUNDARY_MM = 1e-9
+#: A hand that rounding bends by less is straight [rad]; the cosine of a smaller angle is 1.
+BOUNDARY_RAD = 1e-7
 #: Below this sine of the elbow or of axis 5 the closed form is refined.
 SINGULAR = 1e-3
 #: No arm has a longer link [mm].
@@ -117,7 +119,7 @@ class OpwRobot(RobotModel):
         return Robot(KinematicModel(**lengths, offsets=offsets, flip_axes=flips))
 
     def inverse(self, poses: RigidTransform, near: npt.ArrayLike | None = None) -> Array:
-        """All eight solutions of n poses, shape (n, 8, 6): NaN where one does not exist, else in (-180, 180] degrees.
+        """All eight solutions of n poses, shape (n, 8, 6): NaN where one does not exist, else in [-180, 180] degrees.
 
         Branch ``4 * wrist flipped + 2 * reaching back + elbow``, in this fixed order.
         """
@@ -127,6 +129,7 @@ class OpwRobot(RobotModel):
         if finite.any():
             found[finite] = self._solver.reach(RigidTransform.from_matrix(matrices[finite])).joints + 0.0
             self._stretch(found, matrices)
+            self._straighten(found, matrices)
             self._polish(found, matrices)
         if self.coupled_23:
             found[..., 2] += found[..., 1]
@@ -155,21 +158,48 @@ class OpwRobot(RobotModel):
                 retried = self._solver.reach(RigidTransform.from_matrix(pulled)).joints + 0.0
                 serial[rows] = np.where(np.isnan(serial[rows]), retried, serial[rows])
 
+    def _straighten(self, serial: Array, matrices: Array) -> None:
+        """Fill in, in place, solutions (n, 8, 6) of a straight wrist, whose cosine rounding puts beyond 1.
+
+        The hand is bent a hair about the wrist centre; `_polish` takes it away.
+        """
+        x, z = matrices[:, :3, 0], matrices[:, :3, 2]
+        wrists = matrices[:, :3, 3] - self.c4 * z
+        # a straight hand lies in the plane of the arm
+        across = np.abs(wrists[:, 0] * z[:, 1] - wrists[:, 1] * z[:, 0])
+        near = (across <= BOUNDARY_RAD * np.hypot(wrists[:, 0], wrists[:, 1]) + BOUNDARY_MM) | (self.b != 0.0)
+        rows = np.flatnonzero(near & np.isnan(serial[:, :, 0]).any(axis=1) & np.isfinite(across))
+        if not len(rows):
+            return
+        cosine, sine = np.cos(2.0 * BOUNDARY_RAD), np.sin(2.0 * BOUNDARY_RAD)
+        bent = matrices[rows].copy()
+        bent[:, :3, 0] = cosine * x[rows] - sine * z[rows]
+        bent[:, :3, 2] = cosine * z[rows] + sine * x[rows]
+        bent[:, :3, 3] = wrists[rows] + self.c4 * bent[:, :3, 2]
+        retried = self._solver.reach(RigidTransform.from_matrix(bent)).joints + 0.0
+        serial[rows] = np.where(np.isnan(serial[rows]), retried, serial[rows])
+
     def _polish(self, serial: Array, matrices: Array) -> None:
         """Refine, in place, solutions (n, 8, 6) at a stretched arm or a straight wrist.
 
         The closed form takes an arc cosine near 1 there and loses half of its digits: 1e-8 rad, 1e-5 mm.
         """
-        signs = np.array(self.signs, dtype=float)
-        theta = np.radians(serial[..., [2, 4]] * signs[[2, 4]] - np.array(self.offsets_deg)[[2, 4]])
+        signs, offsets = np.array(self.signs, dtype=float), np.array(self.offsets_deg)
+        theta = np.radians(serial[..., [2, 4]] * signs[[2, 4]] - offsets[[2, 4]])
         theta[..., 0] += np.arctan2(self.a2, self.c3)
-        rows, branches = np.nonzero((np.abs(np.sin(theta)) < SINGULAR).any(axis=-1))
-        if not len(rows):
-            return
-        poses = RigidTransform.from_matrix(matrices[rows])
-        spans, size = np.full(6, np.degrees(1.0)), self.c2 + self.c3 + self.c4
-        refined, _ = numeric.solve(self.steps, poses, serial[rows, branches] * signs, size, spans)
-        serial[rows, branches] = refined * signs
+        near = np.abs(np.sin(theta)) < SINGULAR
+        rows, branches = np.nonzero(near[..., 0])
+        if len(rows):
+            poses = RigidTransform.from_matrix(matrices[rows])
+            spans, size = np.full(6, np.degrees(1.0)), self.c2 + self.c3 + self.c4
+            refined, _ = numeric.solve(self.steps, poses, serial[rows, branches] * signs, size, spans)
+            serial[rows, branches] = refined * signs
+        rows, branches = np.nonzero(near[..., 1])
+        if len(rows):
+            chain = np.radians(serial[rows, branches] * signs - offsets)
+            hand = _hand(chain, matrices[rows, :3, :3])
+            turned = (np.degrees(hand) + offsets[3:]) * signs[3:]
+            serial[rows, branches, 3:] = turned - 360.0 * np.ceil((turned - 180.0) / 360.0)
 
     def with_parameters(self, changes: Mapping[str, float]) -> Self:
         """Return the robot with lengths ``a1`` .. ``c4`` [mm] and ``offset_1`` .. ``offset_6`` [deg] increased."""
@@ -197,3 +227,23 @@ class OpwRobot(RobotModel):
         if min(distances) > longest:
             return f"axis 3 fully stretched, the wrist centre is {min(distances) - longest:.1f} mm beyond the arm"
         return f"axis 3 fully folded, the wrist centre is {shortest - max(distances):.1f} mm too near to axis 2"
+
+
+def _hand(theta: Array, rotations: Array) -> Array:
+    """Angles 4 to 6 of the chain, shape (n, 3), from angles (n, 6) whose first three are right [rad].
+
+    Axis 5 from its sine, which is exact where the cosine is 1; its side is that of ``theta``.
+    """
+    c1, s1 = np.cos(theta[:, 0]), np.sin(theta[:, 0])
+    slope = theta[:, 1] + theta[:, 2]
+    c, s = np.cos(slope), np.sin(slope)
+    # the forearm's x, y and z axes in the base
+    forearm = np.stack([np.stack([c * c1, c * s1, -s], axis=1), np.stack([-s1, c1, 0.0 * c], axis=1),
+                        np.stack([s * c1, s * s1, c], axis=1)], axis=1)  # fmt: skip
+    r = forearm @ rotations
+    side = np.where(np.sin(theta[:, 4]) < 0.0, -1.0, 1.0)
+    fourth = np.arctan2(side * r[:, 1, 2], side * r[:, 0, 2])
+    fifth = np.arctan2(side * np.hypot(r[:, 0, 2], r[:, 1, 2]), r[:, 2, 2])
+    c4, s4 = np.cos(fourth), np.sin(fourth)
+    sixth = np.arctan2(c4 * r[:, 1, 0] - s4 * r[:, 0, 0], c4 * r[:, 1, 1] - s4 * r[:, 0, 1])
+    return np.stack([fourth, fifth, sixth], axis=1)

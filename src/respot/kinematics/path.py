@@ -16,6 +16,7 @@ from respot.geometry import Array
 from respot.kinematics.cell import RobotCell
 from respot.kinematics.opw import OpwRobot
 from respot.kinematics.posture import ELBOW, FRONT, WRIST, posture
+from respot.kinematics.turns import ROUNDING
 
 #: Nearer to a singularity than this a path is worth a look: axis 5 and elbow [deg], wrist centre from axis 1 [mm].
 NEAR_DEG, NEAR_MM = 2.0, 50.0
@@ -108,7 +109,7 @@ def _limits(cell: RobotCell, joints: Array) -> Iterator[Finding]:
     for row, axis in np.argwhere(room < LIMIT_MARGIN_DEG):
         low, high = cell.limits[axis]
         text = f"axis {axis + 1} stands at {joints[row, axis]:.3f}, limits {low:g} .. {high:g}"
-        code = "OUT_OF_LIMITS" if room[row, axis] < 0.0 else "NEAR_LIMIT"
+        code = "OUT_OF_LIMITS" if room[row, axis] < -ROUNDING else "NEAR_LIMIT"
         yield Finding(code, int(row), text, f"axis {axis + 1}", float(room[row, axis]) / LIMIT_MARGIN_DEG)
 
 
@@ -127,6 +128,6 @@ def _singularities(model: OpwRobot, joints: Array) -> Iterator[Finding]:
 def _branch_changes(model: OpwRobot, joints: Array) -> Iterator[Finding]:
     names = ("the wrist centre changes to the other side of axis 1", "the elbow turns over", "axis 5 changes its sign")
     known = np.flatnonzero(np.isfinite(joints).all(axis=1))
-    behind = posture(model, joints[known]) < 0.0
+    behind = posture(model, joints[known]) < -ROUNDING
     for pair, column in np.argwhere(behind[1:] != behind[:-1]):
         yield Finding("BRANCH_CHANGE", int(known[pair + 1]), names[column], names[column])

@@ -9,6 +9,8 @@ from respot.geometry import Array
 
 #: Turns that an axis is searched over, to both sides; ABB counts quadrants -5..4 and up to 8.
 TURNS = 360.0 * np.arange(-3, 4)
+#: Inverse kinematics comes back to an angle but for rounding: so near to a border, nothing is beyond it [deg; mm].
+ROUNDING = 1e-6
 
 
 def nearest_turn(joints: Array, near: npt.ArrayLike, revolute: npt.NDArray[np.bool_]) -> Array:
@@ -18,10 +20,11 @@ def nearest_turn(joints: Array, near: npt.ArrayLike, revolute: npt.NDArray[np.bo
 
 
 def outside(joints: Array, limits: Array | None) -> Array:
-    """How far each joint (..., axes) lies outside the limits (axes, 2), 0 inside [deg or mm]."""
+    """How far each joint (..., axes) lies outside the limits (axes, 2), 0 inside and on them [deg or mm]."""
     if limits is None:
         return np.zeros_like(joints)
-    return np.asarray(np.maximum(np.maximum(limits[:, 0] - joints, joints - limits[:, 1]), 0.0))
+    beyond = np.maximum(limits[:, 0] - joints, joints - limits[:, 1])
+    return np.asarray(np.where(beyond <= ROUNDING, 0.0, beyond))
 
 
 def chosen_turn(joints: Array, consistent: npt.NDArray[np.bool_], limits: Array | None) -> tuple[Array, Array]:

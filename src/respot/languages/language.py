@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from scipy.spatial.transform import RigidTransform
 
 from respot.issues import Issue
-from respot.languages.forms import Forms
+from respot.languages.forms import Forms, Profile
 from respot.program.robot import ProgramFile, Robot
 from respot.program.statement import Statement
 from respot.program.targets import Target
@@ -39,8 +39,9 @@ class Language:
         ``block_issues(path, statements)``: what is opened and not closed.
     forms : Forms
         Its instruction forms.
-    read_robot : callable
-        ``read_robot(name, root, files)`` reads the files of one robot.
+    read_robots : callable
+        ``read_robots(name, root, files, forms)`` reads the files of one controller: its robots, one for each task that
+        moves one.
     pose_values : callable
         Fields of a target for a new pose in its base.
     decimals : mapping of str to int
@@ -62,9 +63,14 @@ class Language:
     read_statements: Callable[[str, list[int]], list[Statement]]
     block_issues: Callable[[str, Sequence[Statement]], list[Issue]]
     forms: Forms
-    read_robot: Callable[[str, str, Mapping[str, bytes]], Robot]
+    read_robots: Callable[[str, str, Mapping[str, bytes], Forms], list[Robot]]
     pose_values: Callable[[Target, RigidTransform], dict[str, float]]
     decimals: Mapping[str, int]
     has_configuration: Callable[[Target], bool]
     header_place: Callable[[ProgramFile], Span | None]
     configuration_fields: Sequence[str]
+
+    def with_plant(self, profiles: Iterable[Profile]) -> Language:
+        """Return the language with a plant's profiles of it before its own."""
+        own = [profile for profile in profiles if profile.language == self.name]
+        return replace(self, forms=self.forms.with_plant(own)) if own else self

@@ -42,3 +42,32 @@ class Frame:
 
     def __str__(self) -> str:
         return f"{self.name} {self.label}".rstrip()
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """What a robot carries at its flange.
+
+    Parameters
+    ----------
+    name : str
+        As the program refers to it: ``LOAD_DATA[1]``.
+    mass : float or None
+        Mass in kg; None where it is not known before the robot runs.
+    centre : tuple of float or None
+        Centre of mass in flange coordinates, mm.
+    unknown : str
+        Why the mass is not known.
+    path, line :
+        Where it is declared.
+    """
+
+    name: str
+    mass: float | None = None
+    centre: tuple[float, float, float] | None = None
+    unknown: str = ""
+    path: str | None = None
+    line: int | None = None
+
+    def __str__(self) -> str:
+        return self.name

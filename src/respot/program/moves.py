@@ -7,7 +7,8 @@ from enum import StrEnum
 
 from scipy.spatial.transform import RigidTransform
 
-from respot.program.frames import Frame
+from respot.geometry import IDENTITY
+from respot.program.frames import Frame, Load
 from respot.program.targets import Number, Target
 from respot.source import Span
 
@@ -20,12 +21,40 @@ class Motion(StrEnum):
     CIRCULAR = "circular"
 
 
+class LabelKind(StrEnum):
+    """Where the text about a motion stands."""
+
+    NAME = "name"  # of the target
+    DATA = "data"  # name of weld data: spotdata
+    TITLE = "title"  # of the inline form
+    PARAMS = "params"  # line of an inline form
+    ARGUMENT = "argument"  # of the motion's wrapper or of the call that welds
+    COMMENT = "comment"  # behind the motion or right above it
+    ROUTINE = "routine"  # name of the routine
+
+
+@dataclass(frozen=True)
+class Label:
+    """A text about a motion in which a spot ID may stand."""
+
+    kind: LabelKind
+    text: str
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """What is not known of a motion before the robot runs: a code of `issues.CODES` and the cause."""
+
+    code: str
+    text: str
+
+
 @dataclass(frozen=True, eq=False)
 class BaseOffset:
     """A translation along the axes of the base: the arguments of ``Offs``, a ``LIN_REL`` in the base.
 
     It turns with a correction (facts: rapid.md 2.4, M Offs(p, d) = Offs(M p, R d)). A translation along the tool's axes
-    (``RelTool``, ``P:{..}``, ``LIN_REL .. #TOOL``) does not and needs no record.
+    (``RelTool``, ``P:{..}``, ``LIN_REL .. #TOOL``) does not; on top of a target it is `Move.tool_offset`.
 
     Parameters
     ----------
@@ -74,10 +103,20 @@ class Move:
         The robot holds the part.
     weld : bool
         The motion, or what follows it in its form, welds.
+    labels : tuple of Label
+        Texts in which the spot's ID may stand.
     spot_ids : tuple of str
         What may be the spot's ID, best first.
+    named_spot : bool
+        One of its names is that of a weld spot, whether or not the motion is known to weld.
     unknown : str
-        Why the target of the motion cannot be told before the robot runs.
+        Why the target of the motion, or what it is seen from, cannot be told before the robot runs.
+    load : Load or None
+        What the robot carries; None where the program does not tell.
+    tool_offset : RigidTransform or None
+        Shift in the axes of the target on top of it (``P:{Z -60}``); None where it is not known before the robot runs.
+    doubts : tuple of Doubt
+        Everything that is not known of the motion, with a code.
     """
 
     motion: Motion
@@ -92,14 +131,54 @@ class Move:
     offset: BaseOffset | None = None
     external_tcp: bool = False
     weld: bool = False
+    labels: tuple[Label, ...] = ()
     spot_ids: tuple[str, ...] = ()
+    named_spot: bool = False
     unknown: str = ""
+    load: Load | None = None
+    tool_offset: RigidTransform | None = IDENTITY
+    doubts: tuple[Doubt, ...] = ()
+
+    @property
+    def codes(self) -> tuple[str, ...]:
+        """Codes of what is not known of the motion, each once."""
+        return tuple(dict.fromkeys(doubt.code for doubt in self.doubts))
+
+    @property
+    def _pose(self) -> RigidTransform | None:
+        """``target2base`` with its shift in its own axes."""
+        if self.target is None or self.target.pose is None or self.tool_offset is None:
+            return None
+        return self.target.pose if self.tool_offset is IDENTITY else self.target.pose * self.tool_offset
 
     @property
     def world(self) -> RigidTransform | None:
-        """``target2world`` of the TCP without offsets; None for an external TCP and where a frame is not known."""
-        if self.external_tcp or self.target is None or self.target.pose is None:
+        """``target2world`` of the TCP without base offset; None for an external TCP and where a frame is not known."""
+        if self.external_tcp or self._pose is None or self.base is None or self.base.pose is None:
             return None
-        if self.base is None or self.base.pose is None:
+        return self.base.pose * self._pose
+
+    @property
+    def workpiece(self) -> Frame | None:
+        """What carries the part: the base, or with an external TCP what the robot holds (KUKA: tool, ABB: base)."""
+        if not self.external_tcp or (self.base is not None and self.base.held):
+            return self.base
+        return self.tool
+
+    @property
+    def base2spots(self) -> RigidTransform | None:
+        """Pose of the target's own base in the coordinates in which spots are compared.
+
+        That is ``base2world``. With an external TCP the target is the gun seen from the part, and spots are compared
+        in the part (DESIGN section 5): nothing lies between. None where the base is not known.
+        """
+        if self.external_tcp:
+            return IDENTITY
+        return None if self.base is None else self.base.pose
+
+    @property
+    def spot_pose(self) -> RigidTransform | None:
+        """Pose of the TCP as spots are compared: in the world, or with an external TCP in the part frame."""
+        if self._pose is None or self.base2spots is None:
             return None
-        return self.base.pose * self.target.pose
+        return self.base2spots * self._pose

@@ -49,6 +49,8 @@ class Routine:
         Statements that no rule knows.
     task : str
         Task that runs it, where a controller has several.
+    service : bool
+        By its name it looks after the gun, not the part.
     """
 
     name: str
@@ -58,6 +60,7 @@ class Routine:
     steps: Sequence[Move | Call]
     unread: Sequence[Unread] = ()
     task: str = ""
+    service: bool = False
 
     @cached_property
     def moves(self) -> list[Move]:
@@ -79,13 +82,49 @@ class ProgramFile:
     statements: Sequence[Statement]
 
 
+@dataclass(frozen=True)
+class Fact:
+    """What a backup says about its controller, and where.
+
+    Parameters
+    ----------
+    value : str
+        As the file spells it.
+    path : str
+        File.
+    line : int
+        Line, from 1.
+    """
+
+    value: str
+    path: str
+    line: int
+
+
 @dataclass(frozen=True, eq=False)
 class Machine:
-    """The robot's own data as plain values; kinematic models are made from them."""
+    """The robot's own data as plain values; kinematic models are made from them.
+
+    Parameters
+    ----------
+    model : str
+        Robot type as the backup names it; empty if it does not.
+    values : mapping of str to object
+        Values of the machine data; of several robots of one controller only those of this one.
+    paths : sequence of str
+        Files they come from.
+    facts : mapping of str to Fact
+        What a person asks a controller for first: ``"controller"``, ``"version"``, ``"serial"``, ``"robot type"``,
+        ``"absolute accuracy"``, ``"options"`` or ``"tech packs"``, ``"task"``; only what the backup says.
+    lines : mapping of str to int
+        Line of a value in its file, where ``values`` are single values and not instances with a line of their own.
+    """
 
     model: str = ""
     values: Mapping[str, object] = field(default_factory=dict)
     paths: Sequence[str] = ()
+    facts: Mapping[str, Fact] = field(default_factory=dict)
+    lines: Mapping[str, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +151,8 @@ class Robot:
         The declared frames.
     issues : sequence of Issue
         What was noticed while reading.
+    task : str
+        Task that moves it, where one controller moves several robots; empty otherwise. Such robots share ``root``.
     """
 
     name: str
@@ -124,6 +165,7 @@ class Robot:
     tools: Sequence[Frame]
     bases: Sequence[Frame]
     issues: Sequence[Issue]
+    task: str = ""
 
     @property
     def programs(self) -> list[str]:

@@ -146,6 +146,15 @@ class Shape:
         self.fault = fault
         self._used = 0
         self._names: dict[tuple[str, ...], tuple[str, ...]] = {}
+        self._branches_of: dict[tuple[str, ...], tuple[Branch, ...]] = {}
+
+    def branches(self, kinds: tuple[str, ...]) -> tuple[Branch, ...]:
+        """Every rule of these kinds in the tree, from the left; looked for once for all statements of the shape."""
+        found = self._branches_of.get(kinds)
+        if found is None:
+            found = tuple(branch for branch in _walk(self.tree) if branch.kind in kinds)
+            self._branches_of[kinds] = found
+        return found
 
     def spans(self, text: str, start: int, end: int) -> list[Span]:
         """Spans of the tokens of a statement of this shape."""
@@ -213,6 +222,15 @@ class Shape:
         names = tuple(text[slice(*tokens[name])] for name in self._places.names)
         spans = tuple((tokens[first][0], tokens[last][1]) for _, first, last in self._places.numbers)
         return Numbers(self._keys(names), tuple(text[slice(*span)] for span in spans), spans)
+
+
+def _walk(branch: Branch | None) -> Iterator[Branch]:
+    """Yield a rule and every rule below it, from the left."""
+    waiting = [] if branch is None else [branch]
+    while waiting:
+        found = waiting.pop()
+        yield found
+        waiting += [child for child in reversed(found.children) if isinstance(child, Branch)]
 
 
 class _Places:
@@ -332,6 +350,17 @@ class Statement:
             raise ValueError(f"line {self.line} is {self.kind}: {self.shape.reason or 'it has no tree'}")
         return Node(self.text, self.tokens(), self.shape.tree)
 
+    def find(self, *kinds: str) -> list[Node]:
+        """Every rule of these kinds in the statement's tree, from the left; none for an opaque statement.
+
+        A statement of a shape that has none costs a look into a table: no token of it is searched.
+        """
+        branches = self.shape.branches(kinds)
+        if not branches:
+            return []
+        spans = self.tokens()
+        return [Node(self.text, spans, branch) for branch in branches]
+
     def __repr__(self) -> str:
         return f"<{self.kind} line {self.line}: {self.source!r}>"
 
@@ -358,6 +387,21 @@ class Node:
     def kind(self) -> str:
         """Name of the rule."""
         return self._branch.kind
+
+    @property
+    def branch(self) -> Branch:
+        """The rule in the tree that all statements of its shape share."""
+        return self._branch
+
+    @property
+    def source(self) -> str:
+        """Text of the whole file."""
+        return self._text
+
+    @property
+    def token_spans(self) -> list[Span]:
+        """Spans of the tokens of the whole statement: what the positions in `branch` count."""
+        return self._spans
 
     @property
     def span(self) -> Span:
@@ -389,17 +433,23 @@ class Node:
 
     def all(self, *kinds: str) -> list[Node]:
         """Rules of these kinds directly below."""
-        return [node for node in self.nodes if node.kind in kinds]
+        return [
+            Node(self._text, self._spans, child)
+            for child in self._branch.children
+            if isinstance(child, Branch) and child.kind in kinds
+        ]
 
     def first(self, *kinds: str) -> Node | None:
         """First rule of these kinds directly below, or None."""
-        return next((node for node in self.nodes if node.kind in kinds), None)
+        for child in self._branch.children:
+            if isinstance(child, Branch) and child.kind in kinds:
+                return Node(self._text, self._spans, child)
+        return None
 
     def walk(self) -> Iterator[Node]:
         """Yield this rule and every rule below it, from the left."""
-        yield self
-        for node in self.nodes:
-            yield from node.walk()
+        for branch in _walk(self._branch):
+            yield Node(self._text, self._spans, branch)
 
     def _child(self, child: Branch | Leaf) -> Node | Token:
         return Node(self._text, self._spans, child) if isinstance(child, Branch) else self._token(child)

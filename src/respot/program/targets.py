@@ -6,9 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal
 from enum import StrEnum
+from functools import cached_property
 
 from scipy.spatial.transform import RigidTransform
 
+from respot.geometry import pose, rotation_from_abc, rotation_from_quaternion
 from respot.source import Span
 
 
@@ -47,8 +49,9 @@ class Target:
         Field names of its language: ``X`` .. ``E6`` in KRL, ``x`` .. ``eax_f`` in RAPID.
     fields : frozenset of str
         Names of all fields that the literal has, numbers or not.
-    pose : RigidTransform or None
-        The pose in its base (``target2base``); None for joints and where a field is no number.
+    components : tuple of float
+        Its pose in its base as written: x, y, z in mm, then A, B, C in degrees or q1 to q4; empty for joints and where
+        a field is no number.
     unknown : str
         Why there is no pose.
     declared : bool
@@ -63,9 +66,19 @@ class Target:
     span: Span
     numbers: Mapping[str, Number] = field(default_factory=dict)
     fields: frozenset[str] = frozenset()
-    pose: RigidTransform | None = None
+    components: tuple[float, ...] = ()
     unknown: str = ""
     declared: bool = True
+
+    @cached_property
+    def pose(self) -> RigidTransform | None:
+        """``target2base``; None for joints and where a field is no number."""
+        if not self.components:
+            return None
+        position, orientation = self.components[:3], self.components[3:]
+        return pose(
+            position, rotation_from_quaternion(orientation) if len(orientation) == 4 else rotation_from_abc(orientation)
+        )
 
     def number(self, name: str) -> float | None:
         """Value of a field, None where the literal lacks it."""

@@ -9,8 +9,9 @@ class RegistrationError(ValueError):
     Attributes
     ----------
     code : str
-        Stable code: ``TOO_FEW_PAIRS``, ``COLLINEAR_SPOTS``, ``NOT_A_NUMBER``, ``DUPLICATE_ID``,
-        ``NO_COMMON_IDS`` or ``SHAPE_MISMATCH``.
+        Stable code: ``TOO_FEW_PAIRS``, ``TOO_MANY_SPOTS``, ``COLLINEAR_SPOTS``, ``COPLANAR_SPOTS``, ``NOT_A_NUMBER``,
+        ``DUPLICATE_ID``, ``NO_COMMON_IDS``, ``SHAPE_MISMATCH``, ``BAD_OPTION``, ``NO_SUBSET``, ``NOT_CONGRUENT``,
+        ``AMBIGUOUS_MATCH``, ``UNIT_MISMATCH`` or ``ROWS_SHIFTED``.
     ids : tuple of str
         The names concerned, where names are known.
     rows : tuple of int

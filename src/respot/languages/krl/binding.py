@@ -1,66 +1,51 @@
-"""Tool, base and target of every KRL motion, followed statement by statement.
+"""Tool, base, load, mode and target of every KRL motion.
 
-An inline form sets ``FDAT_ACT`` and calls ``BAS(#PTP_PARAMS|#CP_PARAMS, ..)``, which takes tool, base and interpolation
-mode from it; hand-written code sets ``$TOOL`` and ``$BASE``; a spline names both in its ``WITH`` list (facts: krl.md
-section 5, binding). What two branches of an IF or SWITCH set differently is not known after them; what a loop sets is
-not known where it begins; nothing is known behind a label or behind a call that may set frames.
+Each routine is followed once (`walk`), with its calls first. What a routine leaves as it found it is decided by its
+caller; a subprogram that only its own module can call gets what all its calls agree on. Any other routine may be
+started from anywhere, so that what it does not set itself is not known.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 
+from respot.issues import Issue
+from respot.languages.forms import Forms
 from respot.languages.krl.blocks import Routine as Block
-from respot.languages.krl.forms import FORMS
-from respot.languages.krl.machine import Frames, frame_pose
-from respot.languages.krl.run_time import MOTIONS, RunTime, assignments, called, touches_frames
-from respot.languages.krl.symbols import Aggregate, Symbol, Symbols, module_key, value_of
-from respot.languages.krl.targets import POSITION_TYPES, Targets
+from respot.languages.krl.frames import Frames, mode_conflict
+from respot.languages.krl.motion_data import MotionData
+from respot.languages.krl.operands import Operands
+from respot.languages.krl.run_time import RunTime, left_of
+from respot.languages.krl.state import ENTRY, SLOTS, State, Why, merged
+from respot.languages.krl.symbols import Symbols, is_own, module_key
+from respot.languages.krl.targets import Targets
+from respot.languages.krl.walk import Draft, Walk
 from respot.program.frames import Frame
-from respot.program.moves import BaseOffset, Motion, Move
-from respot.program.robot import Call, Routine, Unread
-from respot.program.statement import OPAQUE, Node, Statement
-from respot.program.targets import Number, Target, TargetKind
+from respot.program.moves import Doubt, Move
+from respot.program.robot import Call, Routine
+from respot.program.statement import Node
+from respot.program.targets import TargetKind
 
-_MOTIONS = {"PTP": Motion.JOINT, "SPTP": Motion.JOINT, "PTP_REL": Motion.JOINT, "SPTP_REL": Motion.JOINT}
-_BRANCHES = frozenset(("if_", "switch"))
-_INNER = frozenset(("else_", "case", "default"))
-_LOOPS = frozenset(("loop", "while_", "for_", "repeat"))
-_CLOSING = frozenset(("end_if", "end_switch", "end_loop", "end_while", "end_for", "until"))
-_HARMLESS_BAS = frozenset(("#VEL_PTP", "#VEL_CP", "#ACC_PTP", "#ACC_CP", "#PTP_DAT", "#CP_DAT", "#OUT_CP", "#TRAFO_ON"))
-_FRAME_INDEX = re.compile(r"(TOOL|BASE)_DATA\[(\d+)\]")
-_FROM_FDAT = re.compile(r"S(?:TOOL2?|BASE)\((\w+)", re.IGNORECASE)
+_DEEPEST = 60
+_WORD = re.compile(r"[\w$]+")
+_UNSET = "nothing in this backup sets it before"
 
 
-@dataclass(frozen=True)
-class _State:
-    """What holds before a statement."""
+class _Routine:
+    """A routine of a file on its way to being bound."""
 
-    tool: Frame | None = None
-    base: Frame | None = None
-    external_tcp: bool = False
-    pending: Aggregate | None = None
-
-    def merge(self, other: _State) -> _State:
-        """State after two branches: only what both agree on."""
-        return _State(
-            self.tool if self.tool is other.tool else None,
-            self.base if self.base is other.base else None,
-            self.external_tcp or other.external_tcp,
-        )
-
-
-@dataclass
-class _Block:
-    """An open block: the state before it and at the end of each branch so far."""
-
-    kind: str
-    before: _State
-    ends: list[_State] = field(default_factory=list)
-    branches: int = 0
-    complete: bool = False  # an ELSE or DEFAULT: one of the branches is taken for sure
+    def __init__(self, block: Block, program: str, path: str, is_local: bool) -> None:
+        self.block = block
+        self.program = program
+        self.path = path
+        self.is_local = is_local  # only its own module can call it
+        self.walk: Walk | None = None
+        self.left: State | None = None
+        self.found: list[tuple[_Routine, State]] = []  # its callers, with the state at each call
+        self.entry: State | None = None
 
 
 class Binder:
@@ -76,380 +61,228 @@ class Binder:
         Its literal positions.
     run_time : RunTime
         What its code changes.
+    forms : Forms
+        Instruction forms.
     """
 
-    def __init__(self, symbols: Symbols, frames: Frames, targets: Targets, run_time: RunTime) -> None:
-        self.symbols = symbols
-        self.frames = frames
-        self.run_time = run_time
-        self._targets = targets
-        self._literal: dict[str, Frame] = {}
+    def __init__(self, symbols: Symbols, frames: Frames, targets: Targets, run_time: RunTime, forms: Forms) -> None:
+        self._forms = forms
+        self._frames = frames
+        self._run_time = run_time
+        self._operands = Operands(symbols, targets, run_time, forms)
+        unsaid = Why("something in this backup uses the external TCP, and nothing sets $IPO_MODE before")
+        self._mode_at_start: bool | Why = unsaid if run_time.external_tcp else False
+        self._data = MotionData(frames, self._operands, self._mode_at_start)
+        self._by_module: dict[tuple[str, str], _Routine] = {}
+        self._global: dict[str, list[_Routine]] = {}
+        self._depth = 0
+        self.issues: list[Issue] = []
 
-    def routine(self, block: Block, module: str, path: str) -> Routine:
-        """Motions and calls of a routine."""
-        return _Walk(self, block, module, path).run()
-
-    def frame_of(self, node: Node, kind: str, module: str) -> Frame | None:
-        """Frame that an expression stands for; None where that is not known before the robot runs."""
-        text = "".join(node.text.split()).upper()
-        if text in ("$NULLFRAME", "$WORLD"):
-            return self._number(kind, 0)
-        indexed = _FRAME_INDEX.fullmatch(text)
-        if indexed and indexed[1] == kind:
-            return self._number(kind, int(indexed[2]))
-        from_fdat = _FROM_FDAT.match(text)
-        if from_fdat:
-            return self._from_fdat(from_fdat[1], kind, module)
-        if node.kind == "aggregate":
-            return self._literal.setdefault(text, _literal_frame(text, node))
-        return None
-
-    def _from_fdat(self, name: str, kind: str, module: str) -> Frame | None:
-        fdat = self.fdat(name, module)
-        number = None if fdat is None else fdat.number(f"{kind}_NO")
-        return None if number is None else self._number(kind, int(number))
-
-    def fdat(self, name: str, module: str) -> Aggregate | None:
-        """Frame data of a name; None where there is none or the code changes it."""
-        symbol = self.symbols.find(name, module)
-        if symbol is None or not isinstance(symbol.value, Aggregate) or self.changed(symbol, module):
-            return None
-        return symbol.value
-
-    def changed(self, symbol: Symbol, module: str) -> bool:
-        """Whether code changes a datum: the code of its own module if it is local, else any."""
-        local = module_key(symbol.path) == module and not symbol.visible
-        return self.run_time.writes(symbol.name, module if local else None)
-
-    def _number(self, kind: str, number: int) -> Frame:
-        return self.frames.tool(number) if kind == "TOOL" else self.frames.base(number)
-
-    def apply_fdat(self, state: _State) -> _State:
-        """Apply BAS(#PTP_PARAMS) or BAS(#CP_PARAMS): take the frames from FDAT_ACT."""
-        fdat = state.pending
-        if fdat is None:
-            return _State()
-        tool, base = fdat.number("TOOL_NO"), fdat.number("BASE_NO")
-        return replace(
-            state,
-            tool=None if tool is None else self.frames.tool(int(tool)),
-            base=None if base is None else self.frames.base(int(base)),
-            external_tcp=str(fdat.members.get("IPO_FRAME", "")).upper() == "#TCP",
-        )
-
-    def target_of(
-        self, node: Node, module: str, place: str, path: str, local: Collection[str]
-    ) -> tuple[Target | None, str]:
-        """Literal that a motion's operand stands for, and why there is none.
+    def bind(self, code: Mapping[str, tuple[str, Sequence[Block]]]) -> list[Routine]:
+        """Bind every routine.
 
         Parameters
         ----------
-        node : Node
-            The operand.
-        module : str
-            Key of the module.
-        place : str
-            Name for a literal in the code.
-        path : str
-            File of the motion.
-        local : collection of str
-            Names, in upper case, that the routine declares itself.
+        code : mapping of str to (str, sequence of Block)
+            Program and routines of each file.
         """
-        operands = list(_operands(node))
-        if len(operands) > 1 and self._is_composed(operands, module):
-            return None, f"{node.text} is composed of several positions"
-        # base * (P : F): whatever the operands mean, moving the first moves the product (DESIGN section 5)
-        node = operands[0]
-        if node.kind == "aggregate":
-            value = value_of(node)
-            assert isinstance(value, Aggregate)  # noqa: S101
-            return self._targets.literal(place, path, value), ""
-        name = "".join(node.text.split())
-        if node.kind != "reference":
-            return None, f"{node.text} is computed while the robot runs"
-        if name.partition("[")[0].upper() in local:
-            return None, f"{name} is declared in the routine and has its position while the robot runs"
-        symbol = self.symbols.find(name, module)
-        if symbol is None:
-            return None, "" if FORMS.is_home(name) else f"{name} is not declared with a position in this backup"
-        if symbol.type == "AMBIGUOUS":
-            return None, f"{name} is declared globally in more than one data list"
-        target = self._targets.declared(symbol)
-        if target is None:
-            return None, f"{name} has no literal position"
-        if self.changed(symbol, module) and target.kind is TargetKind.POSE:
-            return target, f"{name} is assigned to while the robot runs"
-        return target, ""
+        routines: list[_Routine] = []
+        for path, (program, blocks) in code.items():
+            for index, block in enumerate(blocks):
+                is_global = index == 0 or (block.head.shape.tree is not None and bool(block.head.node.tokens("GLOBAL")))
+                routine = _Routine(block, program, path, not is_global)
+                routines.append(routine)
+                self._by_module.setdefault((module_key(path), block.name.upper()), routine)
+                if is_global:
+                    self._global.setdefault(block.name.upper(), []).append(routine)
+        initial_tool = _initial_tool(routines)
+        self._data = MotionData(self._frames, self._operands, self._mode_at_start, initial_tool)
+        for routine in routines:
+            self._left_by(routine)
+        for routine in routines:
+            self._calls_not_understood(routine)
+        return [self._bound(routine) for routine in routines]
 
-    def _is_composed(self, operands: Sequence[Node], module: str) -> bool:
-        """Whether any operand but the first is a position of its own, or the first is none."""
-        if operands[0].text.startswith("$"):
-            return True
-        for operand in operands[1:]:
-            symbol = self.symbols.find(operand.text, module) if operand.kind == "reference" else None
-            if symbol is not None and symbol.type in POSITION_TYPES and symbol.type != "FRAME":
-                return True
-        return False
+    def _calls_not_understood(self, routine: _Routine) -> None:
+        """Count a local subprogram that an unread statement names as called from there."""
+        for unread in routine.walk.unread if routine.walk is not None else ():
+            for word in _WORD.findall(unread.text):
+                found = self._by_module.get((module_key(routine.path), word.upper()))
+                if found is not None:
+                    state = State.unknown(f"the statement in line {unread.line} is not understood and may call it")
+                    found.found.append((routine, state))
 
-
-def _operands(node: Node) -> Iterator[Node]:
-    """Operands of a frame product, from the left."""
-    if node.kind in ("geometric", "group"):
-        for child in node.nodes:
-            yield from _operands(child)
-    else:
-        yield node
-
-
-def _literal_frame(text: str, node: Node) -> Frame:
-    aggregate = value_of(node)
-    found = frame_pose(aggregate) if isinstance(aggregate, Aggregate) else None
-    return Frame(text, pose=found, unknown="" if found is not None else "not a complete frame")
-
-
-class _Walk:
-    """One pass over a routine."""
-
-    def __init__(self, binder: Binder, block: Block, program: str, path: str) -> None:
-        self._binder = binder
-        self._block = block
-        self._program = program
-        self._module = module_key(path)
-        self._path = path
-        self._local = _declared_in(block)
-        self._state = _State()
-        self._open: list[_Block] = []
-        self._steps: list[Move | Call] = []
-        self._unread: list[Unread] = []
-
-    def run(self) -> Routine:
-        """Return the routine."""
-        statements = self._block.body
-        for index, statement in enumerate(statements):
-            if statement.kind in _LOOPS and any(map(self._may_set_frames, _body(statements, index))):
-                self._state = _State()
-            self._step(statement)
-        name, line = self._block.name, self._block.head.line
-        return Routine(name, self._program, self._path, line, tuple(self._steps), tuple(self._unread))
-
-    def _step(self, statement: Statement) -> None:
-        kind = statement.kind
-        if assignments(statement):
-            self._run_calls(statement)
-            for assignment in assignments(statement):
-                self._assign(assignment)
-        elif kind == "call":
-            self._call(statement.node, statement.line)
-        elif kind in MOTIONS:
-            self._steps += self._motion(statement)
-        elif kind == "spline":
-            self._state = self._with_frames(statement.node)
-        elif kind == OPAQUE:
-            self._unread.append(Unread(statement.line, statement.source[:200], statement.shape.reason))
-            self._state = _State() if touches_frames(statement) else self._state
-        elif kind == "label":
-            self._state = _State()
-        else:
-            self._run_calls(statement)
-        self._follow_blocks(kind)
-
-    def _run_calls(self, statement: Statement) -> None:
-        """Follow the calls within a statement: functions, triggers, interrupts."""
-        for node in called(statement):
-            name = node.tokens("NAME")[0].text
-            if not FORMS.is_harmless(name):
-                self._steps.append(Call(name, statement.line))
-                if not self._binder.run_time.leaves_frames(name):
-                    self._state = _State()
-
-    def _may_set_frames(self, statement: Statement) -> bool:
-        if touches_frames(statement):
-            return True
-        names = (node.tokens("NAME")[0].text for node in called(statement))
-        return any(name.upper() != "BAS" and not self._binder.run_time.leaves_frames(name) for name in names)
-
-    def _follow_blocks(self, kind: str) -> None:
-        if kind in _BRANCHES or kind in _LOOPS:
-            self._open.append(_Block(kind, self._state))
-        elif kind in _INNER and self._open and self._open[-1].kind in _BRANCHES:
-            self._branch(kind)
-        elif kind in _CLOSING and self._open:
-            self._close()
-
-    def _branch(self, kind: str) -> None:
-        block = self._open[-1]
-        if block.kind == "if_" or block.branches:
-            block.ends.append(self._state)
-        block.branches += 1
-        block.complete |= kind in ("else_", "default")
-        self._state = block.before
-
-    def _close(self) -> None:
-        block = self._open.pop()
-        ends = [*block.ends, self._state]
-        if not block.complete:
-            ends.append(block.before)
-        state = ends[0]
-        for other in ends[1:]:
-            state = state if state == other else state.merge(other)
-        self._state = state
-
-    def _assign(self, assignment: Node) -> None:
-        left, right = assignment.nodes[0], assignment.nodes[-1]
-        name = "".join(left.text.split()).upper()
-        if name == "FDAT_ACT":
-            self._state = replace(self._state, pending=self._fdat(right))
-        elif name.startswith("FDAT_ACT."):
-            self._state = replace(self._state, pending=None)
-        elif name == "$TOOL":
-            self._state = replace(self._state, tool=self._binder.frame_of(right, "TOOL", self._module))
-        elif name == "$BASE":
-            self._state = replace(self._state, base=self._binder.frame_of(right, "BASE", self._module))
-        elif name.startswith("$TOOL."):
-            self._state = replace(self._state, tool=None)
-        elif name.startswith("$BASE."):
-            self._state = replace(self._state, base=None)
-        elif name == "$IPO_MODE":
-            self._state = replace(self._state, external_tcp=right.text.strip().upper() == "#TCP")
-
-    def _fdat(self, node: Node) -> Aggregate | None:
-        value = value_of(node)
-        return value if isinstance(value, Aggregate) else self._binder.fdat(node.text, self._module)
-
-    def _call(self, node: Node, line: int) -> None:
-        name = node.tokens("NAME")[0].text
-        arguments = [argument.text.strip() for argument in (node.first("arguments") or node).nodes]
-        if name.upper() == "BAS":
-            self._bas([argument.upper() for argument in arguments])
-            return
-        if FORMS.welds(name, arguments):
-            self._weld()
-            return
-        if FORMS.is_harmless(name):
-            return
-        self._steps.append(Call(name, line))
-        if not self._binder.run_time.leaves_frames(name):
-            self._state = _State()
-
-    def _bas(self, arguments: list[str]) -> None:
-        command = arguments[0] if arguments else ""
-        number = int(arguments[1]) if len(arguments) > 1 and arguments[1].isdigit() else None
-        frames = self._binder.frames
-        if command in ("#PTP_PARAMS", "#CP_PARAMS", "#FRAMES"):
-            self._state = self._binder.apply_fdat(self._state)
-        elif command == "#TOOL":
-            self._state = replace(self._state, tool=None if number is None else frames.tool(number))
-        elif command == "#BASE":
-            self._state = replace(self._state, base=None if number is None else frames.base(number))
-        elif command == "#INITMOV":
-            self._state = _State(frames.tool(0), frames.base(0))
-        elif command not in _HARMLESS_BAS:
-            self._state = _State()
-
-    def _weld(self) -> None:
-        """Mark the last motion, if no other routine was called since, as one that welds."""
-        for index in range(len(self._steps) - 1, -1, -1):
-            step = self._steps[index]
-            if isinstance(step, Call) and not self._binder.run_time.leaves_frames(step.name):
-                return  # that routine may have moved: where the gun welds is not known
-            if isinstance(step, Move):
-                name = step.target.name if step.target is not None else ""
-                self._steps[index] = replace(step, weld=True, spot_ids=FORMS.spot_ids(name))
-                return
-
-    def _motion(self, statement: Statement) -> Iterator[Move]:
-        node = statement.node
-        word = next(token.text for token in node.tokens() if token.type.startswith("MOVE"))
-        state = self._with_frames(node)
-        relative = word.upper().endswith("_REL")
-        motion = Motion.CIRCULAR if "CIRC" in word.upper() else _MOTIONS.get(word.upper(), Motion.LINEAR)
-        operands = [child for child in node.nodes if child.kind not in ("approximation", "with_")]
-        if motion is Motion.CIRCULAR:
-            operands = operands[:2]
-        for operand in operands[: 2 if motion is Motion.CIRCULAR else 1]:
-            move = Move(
-                motion=motion,
-                instruction=word,
-                target=None,
-                program=self._program,
-                routine=self._block.name,
-                path=self._path,
-                line=statement.line,
-                tool=state.tool,
-                base=state.base,
-                external_tcp=state.external_tcp,
+    def _left_by(self, routine: _Routine) -> State:
+        """Follow a routine once; return what it leaves."""
+        if routine.left is None:
+            if routine.walk is not None or self._depth >= _DEEPEST:
+                return State.unknown(f"{routine.block.name} calls itself or lies too deep")
+            routine.walk = Walk(
+                routine.block,
+                routine.path,
+                self._operands,
+                self._data,
+                self._run_time,
+                self._forms,
+                partial(self._behind, routine),
+                partial(self._touched_by, routine),
             )
-            if relative:
-                yield self._relative(move, node, operand)
+            self._depth += 1
+            left = routine.walk.run()
+            if self._mode_at_start is False and left.external is False:
+                left = replace(left, external=ENTRY)  # nothing anywhere sets another mode
+            routine.left = left
+            self._depth -= 1
+        return routine.left
+
+    def _behind(self, caller: _Routine, name: str, state: State, later: bool) -> State:
+        """State behind a call."""
+        found = self._named(name, caller)
+        if isinstance(found, str):
+            return State.unknown(found)
+        if later:
+            found.found.append((caller, State.unknown("a trigger or interrupt calls the routine")))
+            return state.forget(self._touched_by(caller, name), f"{name} sets it at a time of its own")
+        found.found.append((caller, state))
+        return self._left_by(found).within(state)
+
+    def _touched_by(self, caller: _Routine, name: str) -> set[str]:
+        """Slots that a call may set."""
+        found = self._named(name, caller)
+        return set(SLOTS) if isinstance(found, str) else self._left_by(found).touched()
+
+    def _named(self, name: str, caller: _Routine) -> _Routine | str:
+        """Routine that a name means, or why that is not known."""
+        own = self._by_module.get((module_key(caller.path), name.upper()))
+        if own is not None:
+            return own
+        others = self._global.get(name.upper(), [])
+        others = [routine for routine in others if is_own(routine.path)] or others
+        if len(others) == 1:
+            return others[0]
+        return f"{name} is not in this backup and may set it" if not others else f"{name} is defined more than once"
+
+    def _entry(self, routine: _Routine, way: tuple[_Routine, ...] = ()) -> State:
+        """What a routine finds when it is called."""
+        if routine.entry is None:
+            start = State.unknown(_UNSET)
+            start = State(start.tool, start.base, start.load, self._mode_at_start, start.pending)
+            if not routine.is_local or not routine.found or routine in way or len(way) >= _DEEPEST:
+                if routine in way or len(way) >= _DEEPEST:
+                    return start
+                routine.entry = start
             else:
-                place = f"{word}@{statement.line}"
-                target, unknown = self._target(operand, place)
-                ids = FORMS.spot_ids(target.name) if target is not None and target.declared else ()
-                yield replace(move, target=target, unknown=unknown, spot_ids=ids)
+                routine.entry = merged(
+                    state.within(self._entry(caller, (*way, routine))) for caller, state in routine.found
+                )
+        return routine.entry
 
-    def _target(self, operand: Node, place: str) -> tuple[Target | None, str]:
-        if operand.kind == "reference" and operand.text.startswith("$"):
-            return None, ""  # the position the robot is at
-        return self._binder.target_of(operand, self._module, place, self._path, self._local)
+    def _bound(self, routine: _Routine) -> Routine:
+        assert routine.walk is not None  # noqa: S101 - every routine was followed
+        entry = self._entry(routine)
+        steps: list[Move | Call] = [
+            step if isinstance(step, Call) else self._move(routine, step, step.state.within(entry))
+            for step in routine.walk.steps
+        ]
+        self.issues += _issues(routine, [step for step in steps if isinstance(step, Move)])
+        name = routine.block.name
+        return Routine(
+            name,
+            routine.program,
+            routine.path,
+            routine.block.head.line,
+            tuple(steps),
+            tuple(routine.walk.unread),
+            service=self._forms.is_service(name),
+        )
 
-    def _with_frames(self, node: Node) -> _State:
-        """State with what a WITH list sets."""
-        state = self._state
-        for assignment in (item for with_ in node.all("with_") for item in with_.all("assignment")):
-            left, right = assignment.nodes[0].text.strip().upper(), assignment.nodes[-1]
-            if left == "$TOOL":
-                state = replace(state, tool=self._binder.frame_of(right, "TOOL", self._module))
-            elif left == "$BASE":
-                state = replace(state, base=self._binder.frame_of(right, "BASE", self._module))
-            elif left == "$IPO_MODE":
-                state = replace(state, external_tcp=self._external(right))
-        return state
+    def _move(self, routine: _Routine, draft: Draft, state: State) -> Move:
+        target = draft.operand.target
+        joints = target is not None and target.kind is TargetKind.JOINTS
+        needs_base = draft.offset is not None if draft.relative else target is not None and not joints
+        doubts = [] if draft.operand.doubt is None else [draft.operand.doubt]
+        unknown = draft.operand.doubt.text if draft.operand.doubt is not None else ""
+        if draft.operand.tool_offset is None:  # the target itself can be corrected all the same
+            doubts.append(Doubt("RUN_TIME_POSE", f"what shifts {target} is computed while the robot runs"))
+        if needs_base:
+            doubts += self._doubts(state)
+            if isinstance(state.external, Why):
+                unknown = unknown or f"whether the robot holds the part is not known: {state.external.reason}"
+        ids, named = self._forms.spot_ids(draft.labels)
+        return Move(
+            motion=draft.motion,
+            instruction=draft.instruction,
+            target=target,
+            program=routine.program,
+            routine=routine.block.name,
+            path=routine.path,
+            line=draft.line,
+            tool=_known(state.tool),
+            base=_known(state.base),
+            offset=draft.offset,
+            external_tcp=state.external is True,
+            weld=draft.weld,
+            labels=tuple(draft.labels),
+            spot_ids=ids,
+            named_spot=named,
+            unknown=unknown,
+            load=None if isinstance(state.load, Why) else state.load,
+            tool_offset=draft.operand.tool_offset,
+            doubts=tuple(doubts),
+        )
 
-    def _external(self, node: Node) -> bool:
-        text = "".join(node.text.split())
-        name = re.match(r"SIPO_MODE\((\w+)", text, re.IGNORECASE)
-        fdat = self._binder.fdat(name[1], self._module) if name else None
-        if fdat is not None:
-            return str(fdat.members.get("IPO_FRAME", "")).upper() == "#TCP"
-        return text.upper() == "#TCP"
-
-    def _relative(self, move: Move, node: Node, operand: Node) -> Move:
-        """LIN_REL and the like: a translation in the base turns with a correction, one in the tool or axes does not."""
-        in_tool = any(token.text.upper() == "TOOL" for token in node.tokens("RELATIVE_TO"))
-        value = value_of(operand)
-        if not isinstance(value, Aggregate):
-            return replace(move, unknown=f"{operand.text} is computed while the robot runs")
-        if in_tool or "A1" in value.members:
-            return move
-        numbers: list[Number | None] = []
-        for name in "XYZ":
-            member = value.members.get(name)
-            numbers.append(member if isinstance(member, Number) else None)
-        turns = any((value.number(name) or 0.0) != 0.0 for name in "ABC")
-        literal = not turns and all(isinstance(member, Number) for member in value.members.values())
-        offset = BaseOffset((numbers[0], numbers[1], numbers[2]), value.span, move.path, move.line, literal)
-        return replace(move, offset=offset)
+    def _doubts(self, state: State) -> list[Doubt]:
+        """What is not known of the frames of a motion to a pose."""
+        found: list[Doubt] = []
+        for code, what, frame in (("UNKNOWN_FRAME", "base", state.base), ("UNKNOWN_TOOL", "tool", state.tool)):
+            if isinstance(frame, Why):
+                found.append(Doubt(code, f"the {what} is not known: {frame.reason}"))
+            elif frame.pose is None:
+                found.append(Doubt(code, f"{what} {frame}: {frame.unknown}"))
+        if isinstance(state.external, Why):
+            if state.external != state.base:
+                message = f"whether the robot holds the gun or the part is not known: {state.external.reason}"
+                found.append(Doubt("UNKNOWN_MODE", message))
+        elif isinstance(state.tool, Frame) and isinstance(state.base, Frame):
+            conflict = mode_conflict(self._frames.typed(state.tool), self._frames.typed(state.base), state.external)
+            if conflict:
+                found.append(Doubt("MODE_CONTRADICTS", conflict))
+        return found
 
 
-def _declared_in(block: Block) -> set[str]:
-    """Names, in upper case, that a routine declares itself: parameters, data, imports."""
-    names: set[str] = set()
-    for statement in (block.head, *block.body):
-        if statement.kind in ("routine", "function", "declaration", "import_"):
-            for node in statement.node.walk():
-                if node.kind in ("parameter", "variable", "import_"):
-                    names.update(token.text.upper() for token in node.tokens("NAME"))
-    return names
+def _known(frame: Frame | Why) -> Frame | None:
+    return None if isinstance(frame, Why) else frame
 
 
-def _body(statements: Sequence[Statement], start: int) -> Iterator[Statement]:
-    """Statements of the loop that begins at ``start``."""
-    depth = 0
-    for statement in statements[start + 1 :]:
-        if statement.kind in _LOOPS or statement.kind in _BRANCHES:
-            depth += 1
-        elif statement.kind in _CLOSING:
-            depth -= 1
-        if depth < 0:
-            return
-        yield statement
+def _initial_tool(routines: Iterable[_Routine]) -> Node | None:
+    """What ``INITMOV`` of ``bas.src`` sets ``$TOOL`` to: ``TOOL_DATA[1]`` or ``$NULLFRAME``, by version."""
+    for routine in routines:
+        if routine.block.name.upper() == "INITMOV" and routine.program.upper() == "BAS":
+            for statement in routine.block.body:
+                if statement.kind == "assignments":
+                    for assignment in statement.node.all("assignment"):
+                        if left_of(assignment) == "$TOOL":
+                            return assignment.nodes[-1]
+    return None
+
+
+def _issues(routine: _Routine, moves: Sequence[Move]) -> list[Issue]:
+    """One issue for each cause in a routine, at its first motion, with the count."""
+    causes: dict[tuple[str, str], list[tuple[Move, Doubt]]] = {}
+    for move in moves:
+        for doubt in move.doubts:
+            cause = "" if doubt.code == "UNKNOWN_TARGET" else doubt.text
+            causes.setdefault((doubt.code, cause), []).append((move, doubt))
+    return [_issue(routine.block.name, code, found) for (code, _), found in causes.items()]
+
+
+def _issue(routine: str, code: str, found: Sequence[tuple[Move, Doubt]]) -> Issue:
+    move, doubt = found[0]
+    message = f"{routine}: {doubt.text}"
+    others = [other for _, other in found[1:] if other.text != doubt.text]
+    if others:
+        names = list(dict.fromkeys(other.text.split(" ", 1)[0] for other in others))
+        message += f"; so are {', '.join(names[:5])}" + (f" and {len(names) - 5} more" if len(names) > 5 else "")
+    if len(found) > 1:
+        message += f" ({len(found)} motions)"
+    return Issue(code, message, move.path, move.line)

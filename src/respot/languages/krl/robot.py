@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import PurePosixPath
 
 from respot.issues import Issue
+from respot.languages.forms import Forms
 from respot.languages.krl import blocks, machine
 from respot.languages.krl.binding import Binder
+from respot.languages.krl.controller import read_facts
+from respot.languages.krl.forms import FORMS
+from respot.languages.krl.frames import Frames
 from respot.languages.krl.recognition import recognise
 from respot.languages.krl.run_time import read_run_time
-from respot.languages.krl.symbols import Scope, Symbols, is_own, module_key, read_symbols
+from respot.languages.krl.symbols import Scope, Symbols, is_own, module_key, read_definitions, read_symbols
 from respot.languages.krl.syntax import ENCODINGS, read_statements
 from respot.languages.krl.targets import Targets
+from respot.languages.layout import live_programs
 from respot.languages.reading import opaque_issues
-from respot.program.robot import ProgramFile, Robot
+from respot.program.robot import Fact, Machine, ProgramFile, Robot
 from respot.source import SourceText
 
 SUFFIXES = (".src", ".dat", ".sub")
@@ -22,8 +28,8 @@ SUFFIXES = (".src", ".dat", ".sub")
 _POINTS = frozenset(("POS", "E6POS", "E3POS", "AXIS", "E6AXIS", "E3AXIS"))
 
 
-def read_robot(name: str, root: str, files: Mapping[str, bytes]) -> Robot:
-    """Read a robot.
+def read_robots(name: str, root: str, files: Mapping[str, bytes], forms: Forms = FORMS) -> list[Robot]:
+    """Read a controller: one robot, as KUKA builds them.
 
     Parameters
     ----------
@@ -33,11 +39,14 @@ def read_robot(name: str, root: str, files: Mapping[str, bytes]) -> Robot:
         Folder of the robot inside the backup.
     files : mapping of str to bytes
         The robot's files by path inside the backup.
+    forms : Forms
+        Instruction forms.
     """
     issues: list[Issue] = []
     read: dict[str, ProgramFile] = {}
+    live = live_programs("krl", SUFFIXES, root, files)
     for path, data in files.items():
-        if path.lower().endswith(SUFFIXES):
+        if path in live:
             if recognise(data) == "krl":
                 read[path] = _read_file(path, data)
             else:
@@ -46,23 +55,24 @@ def read_robot(name: str, root: str, files: Mapping[str, bytes]) -> Robot:
         issues += opaque_issues(file)
         issues += blocks.block_issues(path, file.statements)
     code = {path: blocks.routines(file.statements) for path, file in read.items() if not path.lower().endswith(".dat")}
-    run_time = read_run_time({module_key(path): found for path, found in code.items()})
     scopes = list(_scopes(read))
-    symbols = Symbols(scopes)
-    frames = machine.Frames(symbols, run_time)
+    symbols = Symbols(scopes, [read_definitions(path, read[path].statements, module_key(path)) for path in code])
+    run_time = read_run_time({path: (module_key(path), found) for path, found in code.items()}, forms, symbols)
+    frames = Frames(symbols, run_time)
     targets = Targets({path: file.source for path, file in read.items()})
     for scope in scopes:
         for symbol in scope.symbols.values():
             if symbol.type in _POINTS and not symbol.name.startswith("$"):
                 targets.declared(symbol)
-    binder = Binder(symbols, frames, targets, run_time)
-    routines = [binder.routine(block, read[path].program, path) for path, found in code.items() for block in found]
-    machines = [scope for scope in scopes if scope.module.endswith("$MACHINE")]
-    return Robot(
-        name=_name(files) or name,
+    binder = Binder(symbols, frames, targets, run_time, forms)
+    routines = binder.bind({path: (read[path].program, found) for path, found in code.items()})
+    issues += [*symbols.issues(), *binder.issues]
+    facts = read_facts(root, files, scopes)
+    robot = Robot(
+        name=facts["controller"].value if "controller" in facts else name,
         language="krl",
         root=root,
-        machine=machine.read_machine(machines[0] if machines else None),
+        machine=_machine(scopes, facts),
         files=read,
         routines=routines,
         targets=list(targets),
@@ -70,6 +80,7 @@ def read_robot(name: str, root: str, files: Mapping[str, bytes]) -> Robot:
         bases=frames.declared("BASE"),
         issues=issues,
     )
+    return [robot]
 
 
 def _read_file(path: str, data: bytes) -> ProgramFile:
@@ -82,12 +93,12 @@ def _scopes(read: Mapping[str, ProgramFile]) -> Iterable[Scope]:
     for path in sorted(read, key=lambda path: not is_own(path)):
         if path.lower().endswith(".dat"):
             file = read[path]
-            everywhere = file.program.lower() in ("$config", "$machine")
+            everywhere = file.program.lower() in ("$config", "$machine", "$robcor")
             yield read_symbols(path, file.statements, module_key(path), everywhere)
 
 
-def _name(files: Mapping[str, bytes]) -> str:
-    for path, data in files.items():
-        if PurePosixPath(path).name.lower() == "am.ini":
-            return machine.archive_name(SourceText(path, data).text)
-    return ""
+def _machine(scopes: Iterable[Scope], facts: Mapping[str, Fact]) -> Machine:
+    """Machine data of the robot's own folder, with the line of each value."""
+    scope = next((scope for scope in scopes if scope.module.endswith("$MACHINE")), None)
+    lines = {} if scope is None else {key: symbol.line for key, symbol in scope.symbols.items()}
+    return replace(machine.read_machine(scope), facts=facts, lines=lines)

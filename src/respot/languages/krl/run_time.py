@@ -1,53 +1,99 @@
-"""What KRL code changes while the robot runs: data it assigns to, and frames it leaves behind."""
+"""What KRL code changes while the robot runs: data it assigns to, and routines that move or set frames."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from respot.languages.forms import Forms
 from respot.languages.krl.blocks import Routine as Block
-from respot.languages.krl.forms import FORMS
+from respot.languages.krl.symbols import Aggregate, Symbol, Symbols, bare_name
 from respot.program.statement import OPAQUE, Node, Statement
 
-MOTIONS = frozenset(("motion", "relative_motion", "circular_motion"))
-_INDEXED = re.compile(r"(\w+)\[(\d+)\]")
-_FRAME_WORDS = re.compile(r"\$TOOL\b|\$BASE\b|FDAT_ACT|\bBAS\s*\(", re.IGNORECASE)
+MOTIONS = frozenset(("motion", "relative_motion", "circular_motion", "touch_up_motion"))
+_ELEMENT = re.compile(r"[\w$]+\[([\d,]+)\]")
+#: What an unread statement holds if it might set a frame: its name, or any call.
+_FRAME_WORDS = re.compile(r"\$TOOL\b|\$BASE\b|\$LOAD\b|\$IPO_MODE\b|FDAT_ACT|[\w$]\s*\(", re.IGNORECASE)
 #: Functions of the system that leave frames alone but write into their arguments.
 _WRITING = frozenset(("CREAD", "SREAD", "SWRITE", "CAST_FROM", "CAST_TO", "INVERSE", "FORWARD", "VARSTATE"))
-_FRAME_DATA = ("$TOOL", "$BASE", "$IPO_MODE", "FDAT_ACT")
+#: Functions of KSS itself that change neither frames nor positions; those of frames only make values of frames.
+_SYSTEM = frozenset(
+    [
+        "EK",
+        "EB",
+        "EB_ABS",
+        "EB_TEST",
+        "LK",
+        "EO",
+        "ERR_CLEAR",
+        "ERR_RAISE",
+        "EXISTS_KRLDLG",
+        "GETSYSSTATE",
+        "MBX_REC",
+        "MD_CMD",
+        "MD_GETSTATE",
+        "MD_SETSTATE",
+    ]
+)
+_ASSIGNING = frozenset(("assignments", "trigger", "interrupt_declaration"))
 
 
 def called(statement: Statement) -> Iterator[Node]:
     """Yield every call of a statement: as a statement, in an expression, after DO."""
-    if statement.shape.tree is not None and "(" in statement.source:
-        for node in statement.node.walk():
-            if node.kind in ("call", "function_call"):
-                yield node
+    yield from statement.find("call", "function_call")
 
 
 def assignments(statement: Statement) -> list[Node]:
     """Return every assignment that a statement makes, also after DO; those of a WITH list hold for one motion only."""
-    if statement.kind not in ("assignments", "trigger", "interrupt_declaration"):
-        return []
-    return statement.node.all("assignment")
+    return statement.node.all("assignment") if statement.kind in _ASSIGNING else []
 
 
-def touches_frames(statement: Statement) -> bool:
-    """Whether a statement sets tool or base itself, or might: nobody knows what an unread one does."""
-    if statement.kind == OPAQUE:
-        return bool(_FRAME_WORDS.search(statement.source))
-    if statement.kind in MOTIONS:
-        return False
-    if statement.kind == "spline":
-        return statement.node.first("with_") is not None
-    if any(_left(node).startswith(_FRAME_DATA) for node in assignments(statement)):
-        return True
-    return any(node.tokens("NAME")[0].text.upper() == "BAS" for node in called(statement))
+def may_touch_frames(statement: Statement) -> bool:
+    """Whether an unread statement might set a frame: nobody knows what it does."""
+    return statement.kind == OPAQUE and bool(_FRAME_WORDS.search(statement.source))
 
 
-def _left(assignment: Node) -> str:
+def left_of(assignment: Node) -> str:
+    """Return the left side of an assignment, in upper case without blanks."""
     return "".join(assignment.nodes[0].text.split()).upper()
+
+
+def arguments_of(call: Node) -> list[Node]:
+    """Return the arguments of a call; one that is left out keeps its place."""
+    return (call.first("arguments") or call).nodes
+
+
+def declared_in(block: Block) -> tuple[dict[str, str], list[tuple[str, str]]]:
+    """Names, in upper case, that a routine declares itself with their types, and its parameters with their direction.
+
+    A parameter without a direction is passed by reference.
+    """
+    names: dict[str, str] = {}
+    parameters: list[tuple[str, str]] = []
+    if block.head.shape.tree is not None:
+        for node in (block.head.node.first("parameters") or block.head.node).all("parameter"):
+            direction = node.tokens("DIRECTION")
+            parameters.append((node.tokens("NAME")[0].text.upper(), direction[0].text.upper() if direction else ""))
+    for statement in block.body:
+        if statement.kind == "declaration":
+            node = statement.node
+            kind = node.tokens("NAME")[0].text.upper()
+            for variable in node.all("variable"):
+                names[variable.tokens("NAME")[0].text.upper()] = kind
+    for name, _ in parameters:
+        names.setdefault(name, "")
+    return names, parameters
+
+
+@dataclass(frozen=True)
+class Passed:
+    """The arguments of one call of a routine."""
+
+    module: str
+    path: str
+    line: int
+    arguments: Sequence[str]
 
 
 @dataclass
@@ -56,83 +102,189 @@ class RunTime:
 
     Parameters
     ----------
-    framing : set of str
-        Routines, in upper case, that move or set frames, themselves or through what they call.
+    forms : Forms
+        Instruction forms.
+    symbols : Symbols
+        Data of the robot.
+    moving : set of str
+        Routines, in upper case, that move, themselves or through what they call.
     routines : set of str
         Every routine of the backup, in upper case.
+    passed : mapping of str to list of Passed
+        Calls of each routine with parameters.
+    external_tcp : bool
+        Something in the backup asks for the external TCP.
     """
 
-    framing: set[str] = field(default_factory=set)
+    forms: Forms
+    symbols: Symbols
+    moving: set[str] = field(default_factory=set)
     routines: set[str] = field(default_factory=set)
-    _written: dict[str, set[str]] = field(default_factory=dict)
-    _elements: set[str] = field(default_factory=set)
+    passed: dict[str, list[Passed]] = field(default_factory=dict)
+    external_tcp: bool = False
+    _written: dict[str, dict[str, set[str]]] = field(default_factory=dict)
+    _switched: set[str] = field(default_factory=set)
 
-    def writes(self, name: str, module: str | None = None) -> bool:
-        """Whether code of a module, or of any, changes a datum or a part of it."""
-        modules = self._written.get(name.partition("[")[0].upper(), set())
-        return bool(modules) if module is None else module in modules
+    def writes(self, symbol: Symbol) -> bool:
+        """Whether any code changes a datum or a part of it, itself or through an import."""
+        bare = bare_name(symbol.name.upper())
+        written = self._written.get(bare)
+        if not written:
+            return False
+        element = _element(symbol.name.upper())
+        return any(
+            (not element or "" in elements or element in elements)
+            and self.symbols.owner(bare, module) in (symbol.path, None)
+            for module, elements in written.items()
+        )
 
-    def writes_element(self, name: str) -> bool:
-        """Whether any code changes an array element such as ``BASE_DATA[1]``."""
-        return name.upper() in self._elements or name.partition("[")[0].upper() in self._elements
+    def switches_on(self, name: str) -> bool:
+        """Whether any code sets a switch to something other than FALSE."""
+        return name.upper() in self._switched
 
-    def leaves_frames(self, routine: str) -> bool:
-        """Whether tool and base are known after a call; nobody knows what a routine outside the backup does."""
+    def is_harmless(self, routine: str) -> bool:
+        """Whether a call is known to change neither frames nor positions."""
+        return routine.upper() in _SYSTEM or self.forms.is_harmless(routine)
+
+    def may_move(self, routine: str) -> bool:
+        """Whether a call may move the robot; nobody knows what a routine outside the backup does."""
         name = routine.upper()
-        return name not in self.framing and (name in self.routines or FORMS.is_harmless(name))
+        return name in self.moving or not (name in self.routines or self.is_harmless(name))
 
-    def add(self, assignment: str, module: str) -> None:
-        """Add the left side of an assignment."""
-        bare = re.split(r"[.\[]", assignment)[0]
-        self._written.setdefault(bare, set()).add(module)
-        indexed = _INDEXED.match(assignment)
-        self._elements.add(indexed.group() if indexed else bare)
+    def add(self, name: str, module: str) -> None:
+        """Add a write to a name, with its index and member."""
+        self._written.setdefault(bare_name(name), {}).setdefault(module, set()).add(_element(name))
+
+    def add_value(self, name: str, value: str) -> None:
+        """Add what is assigned to a name: a switch that is only ever set to FALSE stays off."""
+        if value.strip().upper() != "FALSE":
+            self._switched.add(name)
+
+    def follow_imports(self) -> None:
+        """Count a write to an imported name as one to the datum itself."""
+        imports = list(self.symbols.imports())
+        growing = True
+        while growing:
+            growing = False
+            for module, name, there, target in imports:
+                for element in list(self._written.get(name, {}).get(module, ())):
+                    elements = self._written.setdefault(target, {}).setdefault(there, set())
+                    growing |= element not in elements
+                    elements.add(element)
 
 
-def read_run_time(code: Mapping[str, Iterable[Block]]) -> RunTime:
-    """Read what the routines change, by the module they stand in."""
-    found = RunTime()
+def _element(name: str) -> str:
+    """Return the literal index of an element; empty for a whole datum and for an index that is computed."""
+    match = _ELEMENT.match(name)
+    return match[1] if match else ""
+
+
+def read_run_time(code: Mapping[str, tuple[str, Iterable[Block]]], forms: Forms, symbols: Symbols) -> RunTime:
+    """Read what the routines change.
+
+    Parameters
+    ----------
+    code : mapping of str to (str, iterable of Block)
+        Module and routines of each file.
+    forms : Forms
+        Instruction forms.
+    symbols : Symbols
+        Data of the robot.
+    """
+    found = RunTime(forms, symbols)
+    found.external_tcp = any(
+        str(symbol.value.members.get("IPO_FRAME", "")).upper() == "#TCP"
+        for scope in symbols.scopes.values()
+        for symbol in scope.symbols.values()
+        if symbol.type == "FDAT" and isinstance(symbol.value, Aggregate)
+    )
     heads: dict[str, list[list[str]]] = {}
-    for block in (block for blocks in code.values() for block in blocks):
-        heads.setdefault(block.name.upper(), []).append(_directions(block))
+    locals_of: dict[int, dict[str, str]] = {}
+    for _, blocks in code.values():
+        for block in blocks:
+            locals_of[id(block)], parameters = declared_in(block)
+            heads.setdefault(block.name.upper(), []).append([direction for _, direction in parameters])
     found.routines = set(heads)
     calls: dict[str, set[str]] = {}
-    for module, blocks in code.items():
+    for path, (module, blocks) in code.items():
         for block in blocks:
-            own = calls.setdefault(block.name.upper(), set())
+            reader = _Reader(found, heads, module, path, locals_of[id(block)])
             for statement in block.body:
-                if statement.kind in MOTIONS or touches_frames(statement):
-                    found.framing.add(block.name.upper())
-                _read_statement(found, statement, module, heads, own)
-    growing = True
-    while growing:
-        more = {name for name, names in calls.items() if name not in found.framing and names & found.framing}
-        found.framing |= more
-        growing = bool(more)
+                reader.read(statement)
+            calls.setdefault(block.name.upper(), set()).update(reader.calls)
+            if reader.moves:
+                found.moving.add(block.name.upper())
+    found.follow_imports()
+    _spread(found.moving, calls)
     return found
 
 
-def _read_statement(
-    found: RunTime, statement: Statement, module: str, heads: Mapping[str, list[list[str]]], calls: set[str]
-) -> None:
-    for assignment in assignments(statement):
-        found.add(_left(assignment), module)
-    for node in called(statement):
+def _spread(names: set[str], calls: Mapping[str, set[str]]) -> None:
+    """Add every routine that calls one of these, directly or not."""
+    callers: dict[str, set[str]] = {}
+    for caller, called_names in calls.items():
+        for name in called_names:
+            callers.setdefault(name, set()).add(caller)
+    pending = list(names)
+    while pending:
+        for caller in callers.get(pending.pop(), ()):
+            if caller not in names:
+                names.add(caller)
+                pending.append(caller)
+
+
+class _Reader:
+    """Reads the statements of one routine."""
+
+    def __init__(
+        self, found: RunTime, heads: Mapping[str, list[list[str]]], module: str, path: str, local: Mapping[str, str]
+    ) -> None:
+        self.calls: set[str] = set()
+        self.moves = False
+        self._found = found
+        self._heads = heads
+        self._module = module
+        self._path = path
+        self._local = local
+
+    def read(self, statement: Statement) -> None:
+        """Read one statement."""
+        kind = statement.kind
+        if kind in MOTIONS:
+            self.moves = True
+        elif kind in _ASSIGNING:
+            for assignment in statement.node.all("assignment"):
+                self._assignment(assignment)
+        if "#" in statement.source:
+            self._found.external_tcp |= kind != "comment" and "#TCP" in statement.source.upper()
+        for node in called(statement):
+            self._call(node, statement.line)
+
+    def _assignment(self, assignment: Node) -> None:
+        name = left_of(assignment)
+        self._write(name)
+        if name.endswith("_ON"):
+            self._found.add_value(name, assignment.nodes[-1].text)
+
+    def _write(self, name: str) -> None:
+        if bare_name(name) not in self._local:
+            self._found.add(name, self._module)
+
+    def _call(self, node: Node, line: int) -> None:
         name = node.tokens("NAME")[0].text.upper()
-        calls.add(name)
-        if FORMS.is_harmless(name) and name not in _WRITING:
-            continue
-        known = heads.get(name, [])
-        for index, argument in enumerate((node.first("arguments") or node).nodes):
+        self.calls.add(name)
+        if self._found.is_harmless(name) and name not in _WRITING:
+            return
+        known = self._heads.get(name, [])
+        arguments = arguments_of(node)
+        if known and arguments:
+            texts = [argument.text.strip() for argument in arguments]
+            self._found.passed.setdefault(name, []).append(Passed(self._module, self._path, line, texts))
+        for index, argument in enumerate(arguments):
             # local routines of several modules may share a name: any of them may be meant
             outward = not known or any(index >= len(directions) or directions[index] != "IN" for directions in known)
             if argument.kind == "reference" and outward:
-                found.add("".join(argument.text.split()).upper(), module)
-
-
-def _directions(block: Block) -> list[str]:
-    """Direction of each parameter; one without is passed by reference."""
-    if block.head.shape.tree is None:
-        return []
-    parameters = (block.head.node.first("parameters") or block.head.node).all("parameter")
-    return [token[0].text.upper() if (token := node.tokens("DIRECTION")) else "" for node in parameters]
+                text = "".join(argument.text.split()).upper()
+                self._write(text)
+                if bare_name(text).endswith("_ON"):
+                    self._found.add_value(text, "")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from respot.languages.krl.machine import frame_pose
 from respot.languages.krl.symbols import Aggregate, Symbol
 from respot.languages.literals import TargetTable
 from respot.program.targets import Target, TargetKind
@@ -28,7 +27,7 @@ class Targets(TargetTable):
             kind = _kind(aggregate)
             if kind is None:
                 return None
-            found = frame_pose(aggregate) if kind is TargetKind.POSE else None
+            found = _components(aggregate) if kind is TargetKind.POSE else ()
             line, column = self.place(path, aggregate.span[0])
             self._targets[key] = Target(
                 name=name,
@@ -39,8 +38,8 @@ class Targets(TargetTable):
                 span=aggregate.span,
                 numbers=aggregate.numbers(),
                 fields=frozenset(aggregate.members),
-                pose=found,
-                unknown="" if found is not None or kind is TargetKind.JOINTS else "not all of X Y Z A B C are numbers",
+                components=found,
+                unknown="" if found or kind is TargetKind.JOINTS else "not all of X Y Z A B C are numbers",
                 declared=declared,
             )
         return self._targets[key]
@@ -50,3 +49,8 @@ def _kind(aggregate: Aggregate) -> TargetKind | None:
     if not aggregate.members.keys().isdisjoint("XYZABC"):
         return TargetKind.POSE
     return TargetKind.JOINTS if "A1" in aggregate.members else None
+
+
+def _components(aggregate: Aggregate) -> tuple[float, ...]:
+    values = tuple(value for name in "XYZABC" if (value := aggregate.number(name)) is not None)
+    return values if len(values) == 6 else ()

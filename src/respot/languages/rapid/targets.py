@@ -1,97 +1,262 @@
-"""Literal positions of RAPID: robtargets and jointtargets, declared, in arrays and records, or in the code."""
+"""Literal positions of RAPID: robtargets and jointtargets, declared, in arrays and records, or in the code.
+
+A declaration tells by its type what is a position: an aggregate of a robtarget's shape that is declared as something
+else is none (facts: rapid.md 1.4, 1.5).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
+from decimal import Decimal, InvalidOperation
+from math import isfinite, sqrt
+from typing import NamedTuple, TypeAlias
 
-import numpy as np
-
-from respot.geometry import pose, rotation_from_quaternion
 from respot.languages.literals import TargetTable
-from respot.languages.rapid.symbols import Aggregate, Symbol, Value
+from respot.languages.rapid.records import BUILT_IN, JOINTS, POSES, POSITIONS, Fields
+from respot.languages.rapid.symbols import Symbol
+from respot.program.statement import Branch, Leaf, Node
 from respot.program.targets import Number, Target, TargetKind
+from respot.source import SourceText, Span
 from respot.tolerance import QUATERNION_NORM
 
-ROBTARGET_FIELDS = (
-    ("x", "y", "z"),
-    ("q1", "q2", "q3", "q4"),
-    ("cf1", "cf4", "cf6", "cfx"),
-    ("eax_a", "eax_b", "eax_c", "eax_d", "eax_e", "eax_f"),
-)
-JOINTTARGET_FIELDS = (
-    ("rax_1", "rax_2", "rax_3", "rax_4", "rax_5", "rax_6"),
-    ("eax_a", "eax_b", "eax_c", "eax_d", "eax_e", "eax_f"),
-)
-_KINDS = {
-    tuple(len(group) for group in ROBTARGET_FIELDS): (TargetKind.POSE, ROBTARGET_FIELDS),
-    tuple(len(group) for group in JOINTTARGET_FIELDS): (TargetKind.JOINTS, JOINTTARGET_FIELDS),
+#: Where an element stands in a datum: an index from 0 for each dimension, then for each field of a record.
+Keys: TypeAlias = tuple[int, ...]
+
+_GROUPS = {
+    kind: tuple(tuple(name for _, name in BUILT_IN[group]) for group, _ in BUILT_IN[record])
+    for kind, record in ((TargetKind.POSE, "robtarget"), (TargetKind.JOINTS, "jointtarget"))
 }
+_FIELDS = {kind: frozenset(name for group in groups for name in group) for kind, groups in _GROUPS.items()}
+_COMPONENTS = ("x", "y", "z", "q1", "q2", "q3", "q4")
+_DEEPEST = 12
+
+
+class _Place(NamedTuple):
+    """Where the numbers of a literal stand among the tokens of its statement: field, first and last token."""
+
+    kind: TargetKind
+    numbers: tuple[tuple[str, int, int], ...]
+
+
+class _Numbers(Mapping[str, Number]):
+    """Numbers of a literal by field, made when they are asked for: a large backup has millions."""
+
+    __slots__ = ("_made", "_spans", "_text")
+
+    def __init__(self, text: str, spans: tuple[tuple[str, Span], ...]) -> None:
+        self._text = text
+        self._spans = spans
+        self._made: dict[str, Number] | None = None
+
+    @property
+    def _numbers(self) -> dict[str, Number]:
+        if self._made is None:
+            found = ((name, _number(self._text, span)) for name, span in self._spans)
+            self._made = {name: number for name, number in found if number is not None}
+        return self._made
+
+    def __getitem__(self, name: str) -> Number:
+        return self._numbers[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._numbers)
+
+    def __len__(self) -> int:
+        return len(self._numbers)
 
 
 class Targets(TargetTable):
     """Every literal position of a robot."""
 
-    def declared(self, symbol: Symbol) -> dict[tuple[int, ...], Target]:
-        """Targets within a datum, by their index in it; ``()`` is the datum itself."""
-        return dict(self._within(symbol.name, symbol.path, symbol.value, ()))
+    def __init__(self, sources: Mapping[str, SourceText]) -> None:
+        super().__init__(sources)
+        self.sources = sources
+        self._places: dict[tuple[int, str], tuple[Branch, _Place | None]] = {}
+        self._declared: dict[tuple[str, int, str], dict[Keys, Target]] = {}
+
+    def declared(self, symbol: Symbol, fields_of: Callable[[str], Fields | None]) -> Mapping[Keys, Target]:
+        """Targets within a datum; ``()`` is the datum itself.
+
+        Parameters
+        ----------
+        symbol : Symbol
+            The datum, its type with aliases followed.
+        fields_of : callable
+            Fields of a record type, None of any other type.
+        """
+        found = self._declared.get(symbol.key)
+        if found is None:
+            found = self._declared[symbol.key] = {}
+            if holds_positions(symbol.type, fields_of):
+                node = symbol.node
+                if node is not None:
+                    self._within(found, symbol, node, symbol.type, symbol.dimensions, (), symbol.name, fields_of)
+        return found
 
     def _within(
-        self, name: str, path: str, value: Value | None, index: tuple[int, ...]
-    ) -> Iterator[tuple[tuple[int, ...], Target]]:
-        if not isinstance(value, Aggregate):
+        self,
+        found: dict[Keys, Target],
+        symbol: Symbol,
+        node: Node,
+        kind: str,
+        dimensions: int,
+        keys: Keys,
+        name: str,
+        fields_of: Callable[[str], Fields | None],
+    ) -> None:
+        if dimensions:
+            for index, item in enumerate(node.nodes if node.kind == "aggregate" else ()):
+                inner = f"{name[:-1]},{index + 1}}}" if keys else f"{name}{{{index + 1}}}"
+                self._within(found, symbol, item, kind, dimensions - 1, (*keys, index), inner, fields_of)
             return
-        target = self.literal(name, path, value, declared=True)
-        if target is not None:
-            yield index, target
+        if kind in POSITIONS:
+            target = self.literal(name, symbol.path, node, declared=True, kind=kind)
+            if target is not None:
+                found[keys] = target
             return
-        for number, item in enumerate(value.items, 1):
-            yield from self._within(f"{name}{{{number}}}", path, item, (*index, number))
+        fields = fields_of(kind)
+        items = node.nodes if node.kind == "aggregate" else []
+        if fields is None or len(items) != len(fields) or len(keys) > _DEEPEST:
+            return
+        for index, ((inner, field), item) in enumerate(zip(fields, items, strict=True)):
+            if holds_positions(inner, fields_of):
+                self._within(found, symbol, item, inner, 0, (*keys, index), f"{name}.{field}", fields_of)
 
-    def literal(self, name: str, path: str, aggregate: Aggregate, declared: bool = False) -> Target | None:
-        """Target of an aggregate; None if it has not the shape of one."""
-        found = _KINDS.get(aggregate.shape())
-        if found is None:
+    def literal(self, name: str, path: str, node: Node, declared: bool = False, kind: str = "") -> Target | None:
+        """Target of an aggregate.
+
+        Parameters
+        ----------
+        name : str
+            Name to give it.
+        path : str
+            Its file.
+        node : Node
+            The aggregate.
+        declared : bool
+            It has a name of its own.
+        kind : str
+            Type that it is known to have; its shape decides where it is not known.
+
+        Returns
+        -------
+        Target or None
+            None for anything that is no position.
+        """
+        branch = node.branch
+        known = self._places.get((id(branch), kind))
+        if known is None:
+            known = self._places[id(branch), kind] = (branch, _place(branch, kind))
+        place = known[1]
+        if place is None:
             return None
-        key = (path, aggregate.span[0])
-        if key not in self._targets:
-            kind, groups = found
-            numbers = _numbers(aggregate, groups)
-            line, column = self.place(path, aggregate.span[0])
-            values = [numbers.get(field) for group in ROBTARGET_FIELDS[:2] for field in group]
-            unknown = _doubt(values) if kind is TargetKind.POSE else ""
-            known = kind is TargetKind.POSE and not unknown
-            floats = [float(value.value) for value in values if value is not None]
-            self._targets[key] = Target(
-                name=name,
-                kind=kind,
-                path=path,
-                line=line,
-                column=column,
-                span=aggregate.span,
-                numbers=numbers,
-                fields=frozenset(field for group in groups for field in group),
-                pose=pose(floats[:3], rotation_from_quaternion(floats[3:])) if known else None,
-                unknown=unknown,
-                declared=declared,
+        span = node.span
+        key = (path, span[0])
+        found = self._targets.get(key)
+        if found is None:
+            found = self._targets[key] = self._make(name, path, node, span, place, declared)
+        return found
+
+    def _make(self, name: str, path: str, node: Node, span: Span, place: _Place, declared: bool) -> Target:
+        tokens, text = node.token_spans, node.source
+        spans = tuple([(field, (tokens[first][0], tokens[last][1])) for field, first, last in place.numbers])
+        numbers = _Numbers(text, spans)
+        components: tuple[float, ...] = ()
+        unknown = ""
+        if place.kind is TargetKind.POSE:
+            components = _components(text, spans) or tuple(
+                float(numbers[field].value) for field in _COMPONENTS if field in numbers
             )
-        return self._targets[key]
+            unknown = _doubt(components)
+        line, column = self.place(path, span[0])
+        return Target(
+            name=name,
+            kind=place.kind,
+            path=path,
+            line=line,
+            column=column,
+            span=span,
+            numbers=numbers,
+            fields=_FIELDS[place.kind],
+            components=() if unknown else components,
+            unknown=unknown,
+            declared=declared,
+        )
 
 
-def _numbers(aggregate: Aggregate, groups: tuple[tuple[str, ...], ...]) -> dict[str, Number]:
-    found: dict[str, Number] = {}
-    for group, item in zip(groups, aggregate.items, strict=True):
-        if isinstance(item, Aggregate):
-            found.update(
-                (name, value) for name, value in zip(group, item.items, strict=True) if isinstance(value, Number)
-            )
-    return found
+def holds_positions(kind: str, fields_of: Callable[[str], Fields | None], depth: int = 0) -> bool:
+    """Whether a datum of a type is a position or a record that holds one."""
+    if kind in POSITIONS:
+        return True
+    if kind in BUILT_IN or depth > _DEEPEST:
+        return False
+    fields = fields_of(kind)
+    return fields is not None and any(holds_positions(inner, fields_of, depth + 1) for inner, _ in fields)
 
 
-def _doubt(values: list[Number | None]) -> str:
-    quaternion = [float(value.value) for value in values[3:] if value is not None]
-    if any(value is None for value in values):
+def _place(branch: Branch, kind: str) -> _Place | None:
+    """Where the numbers of a literal stand; None if it cannot be one of its type, or of the shape of a position."""
+    if branch.kind != "aggregate":
+        return None
+    items = [child for child in branch.children if isinstance(child, Branch)]
+    kinds = (
+        [TargetKind.POSE] if kind in POSES else [TargetKind.JOINTS] if kind in JOINTS else [*_GROUPS]
+    )  # fmt: skip
+    for found in kinds:
+        groups = _GROUPS[found]
+        if len(items) == len(groups) and all(map(_fits, items, groups, [bool(kind)] * len(groups))):
+            numbers = [
+                (name, part.first, part.last)
+                for group, item in zip(groups, items, strict=True)
+                if item.kind == "aggregate"
+                for name, part in zip(group, _branches(item), strict=True)
+                if _is_number(part)
+            ]
+            return _Place(found, tuple(numbers))
+    return None
+
+
+def _fits(item: Branch, group: tuple[str, ...], typed: bool) -> bool:
+    """Whether an item may be this group of fields: an aggregate of as many, or the name of such a datum."""
+    if item.kind == "aggregate":
+        return len(_branches(item)) == len(group)
+    return item.kind in ("reference", "function_call") and (typed or group[0] not in ("x", "rax_1"))
+
+
+def _branches(branch: Branch) -> list[Branch]:
+    return [child for child in branch.children if isinstance(child, Branch)]
+
+
+def _is_number(branch: Branch) -> bool:
+    if branch.kind == "signed":
+        inner = branch.children[-1]
+        return isinstance(inner, Branch) and inner.kind == "number" and isinstance(branch.children[0], Leaf)
+    return branch.kind == "number"
+
+
+def _number(text: str, span: Span) -> Number | None:
+    try:
+        value = Decimal("".join(text[slice(*span)].split()))
+    except InvalidOperation:
+        return None
+    return Number(value, span) if isfinite(float(value)) else None  # no controller holds 1E400
+
+
+def _components(text: str, spans: tuple[tuple[str, Span], ...]) -> tuple[float, ...]:
+    """Position and orientation as the literal says them; empty unless all are plain numbers."""
+    if len(spans) < len(_COMPONENTS) or spans[6][0] != "q4":
+        return ()
+    try:
+        found = tuple([float(text[start:end]) for _, (start, end) in spans[:7]])
+    except ValueError:
+        return ()
+    return found if all(map(isfinite, found)) else ()
+
+
+def _doubt(values: tuple[float, ...]) -> str:
+    if len(values) != len(_COMPONENTS):
         return "not every component of position and orientation is a number"
-    norm = float(np.linalg.norm(quaternion))
+    norm = sqrt(sum(value * value for value in values[3:]))
     if norm == 0.0:
         return "the quaternion is all zero: the target was never taught"
     if abs(norm - 1.0) > QUATERNION_NORM:

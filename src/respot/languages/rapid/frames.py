@@ -1,0 +1,167 @@
+"""Tools, work objects and loads as the motions of a task name them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+from respot.languages.rapid import machine
+from respot.languages.rapid.references import Datum, resolve, whole
+from respot.languages.rapid.run_time import RunTime
+from respot.languages.rapid.symbols import Module, Symbol, Task, Value, value_of
+from respot.program.frames import Frame, Load
+from respot.program.statement import Node
+
+_READERS: dict[str, Callable[[str, Value | None, str, int], Frame]] = {
+    "tooldata": machine.read_tool,
+    "wobjdata": machine.read_work_object,
+}
+_WHAT = {"tooldata": "tool", "wobjdata": "work object"}
+
+
+@dataclass(frozen=True)
+class FrameUse:
+    """The tool or work object of a motion.
+
+    Parameters
+    ----------
+    frame : Frame or None
+        None where the routine's caller decides, and where nothing tells.
+    parameter : str
+        Parameter, in lower case, that the routine gets it as.
+    absent : Frame or None
+        What holds if that parameter is not given.
+    load : Load or None
+        Of a tool: what the robot carries.
+    """
+
+    frame: Frame | None = None
+    parameter: str = ""
+    absent: Frame | None = None
+    load: Load | None = None
+
+
+NO_FRAME = FrameUse()
+FLANGE = FrameUse(machine.TOOL0)
+WORLD = FrameUse(machine.WOBJ0)
+
+
+class Frames:
+    """Tools and work objects of a task; one `Frame` for each datum.
+
+    Parameters
+    ----------
+    task : Task
+        Names of the task.
+    run_time : RunTime
+        What its code changes.
+    """
+
+    def __init__(self, task: Task, run_time: RunTime) -> None:
+        self._task = task
+        self._run_time = run_time
+        self._uses: dict[object, FrameUse] = {}
+
+    def of(self, symbol: Symbol, module: Module) -> FrameUse:
+        """Tool or work object of a datum."""
+        return self._use(whole(symbol, self._task, module), symbol.name, module)
+
+    def named(self, node: Node, kind: str, module: Module, local: Mapping[str, Symbol]) -> FrameUse:
+        """Return the tool or work object that an expression names.
+
+        Parameters
+        ----------
+        node : Node
+            The expression.
+        kind : str
+            ``tooldata`` or ``wobjdata``.
+        module, local :
+            Where it stands.
+        """
+        if node.kind == "aggregate":
+            return FrameUse(_READERS[kind](node.text, value_of(node), module.path, 0))
+        if node.kind != "reference":
+            return FrameUse(_unknown(node.text, "is computed while the robot runs"))
+        datum = resolve(node, self._task, module, local)
+        if datum is None:
+            world = {"tool0": FLANGE, "wobj0": WORLD}.get(node.text.lower())
+            if world is not None and (kind == "tooldata") == (world is FLANGE):
+                return world
+            key = ("nowhere", node.text.lower())
+            if key not in self._uses:
+                self._uses[key] = FrameUse(_unknown(node.text, "not declared in this backup"))
+            return self._uses[key]
+        if datum.unknown:
+            return FrameUse(_unknown(node.text, datum.unknown))
+        if datum.type != kind:
+            return FrameUse(_unknown(node.text, f"has the type {datum.type}, not {kind}"))
+        return self._use(datum, node.text, module)
+
+    def load(self, node: Node, module: Module, local: Mapping[str, Symbol]) -> Load:
+        r"""Return the load that ``\TLoad`` names."""
+        datum = resolve(node, self._task, module, local) if node.kind == "reference" else None
+        if datum is None or datum.unknown or datum.type != "loaddata":
+            return Load(node.text, unknown="not declared in this backup")
+        changed = self._run_time.changes(datum.symbol)
+        value = datum.value()
+        if datum.symbol.storage == "parameter" or changed or value is None:
+            return Load(node.text, unknown=changed or "it has no literal value")
+        return machine.read_load(node.text, value_of(value), datum.symbol.path, datum.symbol.line)
+
+    def _use(self, datum: Datum, name: str, module: Module) -> FrameUse:
+        symbol = datum.symbol
+        if symbol.storage == "parameter":
+            if not datum.keys and not datum.dimensions:
+                return FrameUse(None, parameter=symbol.name.lower())
+            return FrameUse(_unknown(name, "is part of a parameter of the routine"))
+        key = (symbol.key, datum.keys)
+        if key not in self._uses:
+            self._uses[key] = self._read(datum, name, module)
+        return self._uses[key]
+
+    def _read(self, datum: Datum, name: str, module: Module) -> FrameUse:
+        symbol = datum.symbol
+        if datum.dimensions:
+            return FrameUse(_unknown(name, "is an array", symbol))
+        read = _READERS[datum.type]
+        origin, doubt = self._origin(datum, module)
+        node = origin.value()
+        value = None if node is None else value_of(node)
+        frame = read(name, value, symbol.path, symbol.line)
+        reason = doubt or self._run_time.changes(symbol)
+        if reason:
+            frame = replace(frame, pose=None, unknown=reason)
+        load = machine.read_tool_load(name, value, symbol.path, symbol.line) if datum.type == "tooldata" else None
+        if load is not None and reason:
+            load = Load(load.name, unknown=reason, path=load.path, line=load.line)
+        return FrameUse(frame, load=load)
+
+    def _origin(self, datum: Datum, module: Module) -> tuple[Datum, str]:
+        """Return the declaration that gives the value, and why none does.
+
+        Persistent data of several tasks are one: a task that declares it without a value gets that of another. Globals
+        of one name in several modules cannot be loaded together: equal values leave no doubt.
+        """
+        symbol = datum.symbol
+        shared = self._run_time.shared.get((symbol.name.lower(), symbol.type), ()) if symbol.shared else ()
+        others = [other for other in (*shared, *self._task.rivals(symbol, module)) if other.initial is not None]
+        candidates = [replace(datum, symbol=other) for other in others if other.key != symbol.key]
+        if symbol.initial is not None:
+            candidates.insert(0, datum)
+        texts: dict[str, Datum] = {}
+        for candidate in candidates:
+            node = candidate.value()
+            if node is not None:
+                texts.setdefault("".join(node.text.split()).lower(), candidate)
+        if len(texts) > 1:
+            first, second = list(texts.values())[:2]
+            what = _WHAT[datum.type]
+            reason = f"the {what} has different values at {first.symbol.place} and {second.symbol.place}"
+            return first, reason
+        return (next(iter(texts.values())) if texts else datum), ""
+
+
+def _unknown(name: str, reason: str, symbol: Symbol | None = None) -> Frame:
+    if symbol is None:
+        return Frame(name, pose=None, unknown=reason)
+    return Frame(name, pose=None, unknown=reason, path=symbol.path, line=symbol.line)

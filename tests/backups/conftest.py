@@ -1,0 +1,3 @@
+from tests.cli.conftest import respot
+
+__all__ = ["respot"]
