@@ -9,7 +9,14 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from respot.geometry import abc_from_rotation, quaternion_from_rotation, rotation_from_abc, rotation_from_quaternion
+from respot.geometry import (
+    IDENTITY,
+    abc_from_rotation,
+    quaternion_from_rotation,
+    rotation_from_abc,
+    rotation_from_quaternion,
+)
+from respot.issues import Issue
 from respot.program.frames import Frame
 from respot.program.moves import Move
 from respot.program.robot import Robot
@@ -21,6 +28,9 @@ from respot.tables import Table
 _POSE = ("x", "y", "z", "a", "b", "c", "q")
 #: ABB's 9E9: the axis is not used.
 _UNUSED = 8e9
+
+#: Forms whose copies are compared without being asked for: a second or two.
+MOST_FORMS = 4000
 
 Record = dict[str, Any]
 
@@ -56,6 +66,24 @@ def inspect_robot(robot: Robot, spots: SpotTable) -> Record:
         "targets": _targets(aimed, ids),
         "unresolved": [_unresolved(move) for move in moves if move.target is None and move.unknown],
     }
+
+
+def form_issues(robot: Robot, every: bool = False) -> list[Issue]:
+    """Say which copies of the fields of inline forms disagree.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    every : bool
+        Compare all forms, however many; without it a robot with more than `MOST_FORMS` is only said to have them.
+    """
+    if len(robot.forms) > MOST_FORMS and not every:
+        message = (
+            f"{robot.name}: the copies in {len(robot.forms)} inline forms were not compared; --forms compares them"
+        )
+        return [Issue("NOT_CHECKED", message)]
+    return [issue for form in robot.forms for issue in form.disagreements()]
 
 
 def inspect_table(table: Table) -> Record:
@@ -176,6 +204,12 @@ def _in_world(aimed: Sequence[tuple[Move, Target]], own: _Poses) -> _Poses:
         known[rows] = True
         positions[rows] = base.apply(positions[rows])
         quaternions[rows] = (base.rotation * Rotation.from_quat(quaternions[rows])).as_quat()
+    for row, (move, _) in enumerate(aimed):
+        if known[row] and move.tool_offset is not IDENTITY:  # P:{Z -60}, RelTool
+            place = move.world
+            known[row] = place is not None
+            if place is not None:
+                positions[row], quaternions[row] = place.translation, place.rotation.as_quat()
     return known, positions, Rotation.from_quat(quaternions)
 
 
@@ -203,6 +237,8 @@ def _described(move: Move, target: Target, spot_id: str | None) -> Record:
         "tool": None if move.tool is None else str(move.tool),
         "base": None if move.base is None else str(move.base),
         "external_tcp": move.external_tcp,
+        "load": None if move.load is None else move.load.name,
+        "codes": list(move.codes),
         "doubt": _doubt(move, target),
     }
 
@@ -242,6 +278,7 @@ def _unresolved(move: Move) -> Record:
         "routine": move.routine,
         "path": move.path,
         "line": move.line,
+        "codes": list(move.codes),
         "reason": move.unknown,
     }
 

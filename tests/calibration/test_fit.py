@@ -154,7 +154,9 @@ def code_of(*arguments, **options):
 def test_bad_tables_have_codes(points):
     ids, source, reference = points.rear_door()
     assert code_of(ids[:3], source[:3], ids, reference).code == "TOO_FEW_PAIRS"
-    assert code_of(ids, source, [f"Q{name}" for name in ids], reference).code == "NO_COMMON_IDS"
+    other = [f"Q{row}" for row in range(14)]
+    assert code_of(ids, source, other, reference, matching="id").code == "NO_COMMON_IDS"
+    assert code_of(ids, source, other, reference * [1, 2, 3]).code == "NO_COMMON_IDS"
     twice = [*ids[:-1], ids[0]]
     error = code_of(twice, source, ids, reference)
     assert (error.code, error.ids) == ("DUPLICATE_ID", (ids[0],))
@@ -165,6 +167,8 @@ def test_bad_tables_have_codes(points):
     error = code_of(ids, source, ids, broken)
     assert (error.code, error.ids) == ("NOT_A_NUMBER", (ids[4],))
     assert ids[4] in str(error)
+    assert code_of(ids, source, other, broken).code == "NOT_A_NUMBER"
+    assert code_of(ids, source, ids, broken, matching="geometry").code == "NOT_A_NUMBER"
     assert code_of(ids, source[:5], ids, reference).code == "SHAPE_MISMATCH"
 
 

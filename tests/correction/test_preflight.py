@@ -285,3 +285,16 @@ def test_nearer_to_a_singularity(convert):
     done = convert(one((10, -80, 90, 0, 2.3, 0), 2, 2), shift=(0, 0, -20))
     (message,) = said(done, "NEAR_SINGULARITY")
     assert "axis 5 stands" in message and "XP1" in message
+
+
+@pytest.mark.parametrize("way", ["LIN_REL {{Z {0:.1f}}} #TOOL\n", "LIN XS1:{{X 0,Y 0,Z {0:.1f},A 0,B 0,C 0}}\n"])
+@pytest.mark.parametrize("far", [False, True])
+def test_a_shift_along_the_tool_must_be_in_reach(convert, way, far):
+    """From S1 along the gun's z to some way, or to 30 mm before the end of the reach and then 60 mm further."""
+    flange = KUKA.forward((10, *GOOD[1:]))
+    reach = max(distance for distance in range(3000) if KUKA.inverse(product(flange, along(z=distance))))
+    heading = np.array([flange[row][2] for row in range(3)])
+    files = program(small.lin("S1") + way.format(reach - 30.0 if far else 120.0), "")
+    done = convert({**files, **machine()}, shift=60.0 * heading)
+    assert done.code == int(far), done.err
+    assert done.refusals() == ({("weld", "XS1", "OUT_OF_REACH")} if far else set())

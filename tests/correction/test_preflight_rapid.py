@@ -194,3 +194,22 @@ def test_what_is_not_known_of_a_chain_is_said():
     assert code(None, known) == "UNKNOWN_TOOL"
     assert code(known, Frame("b", pose=None, unknown="why")) == "UNKNOWN_FRAME"
     assert code(known, known) == "CONFIG_NOT_CHECKED"
+
+
+@pytest.mark.parametrize("far", [False, True])
+def test_a_shift_along_the_tool_must_be_in_reach(convert, far):  # noqa: F811
+    """RelTool from S1 along the gun's z to some way, or to 30 mm before the end of the reach and then 60 mm further."""
+    flange = ABB.forward((35, *GOOD[1:]))
+    reach = max(way for way in range(3000) if ABB.inverse(product(flange, along(z=way))))
+    heading = np.array([flange[row][2] for row in range(3)])
+    files = rapid(f"    MoveL RelTool(S1,0,0,{reach - 30.0 if far else 120.0}),v800,z10,tGun\\WObj:=wFloor;\n", "")
+    done = convert(files, shift=60.0 * heading)
+    assert done.code == int(far), done.err
+    assert done.refusals() == ({("Weld", "S1", "OUT_OF_REACH")} if far else set())
+
+
+def test_a_shift_along_the_tool_that_is_computed_is_said_to_be_unchecked(convert):  # noqa: F811
+    data = "  VAR num nWay:=5;\n"
+    body = "    nWay:=nWay+1;\n    MoveL RelTool(S1,0,0,nWay),v800,z10,tGun\\WObj:=wFloor;\n"
+    done = convert(rapid(body, data), a1=1.0)
+    assert any("shift along the tool" in text for text in said(done, "NOT_CHECKED"))

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+import typer
+
 from respot.cli import options
 from respot.cli.outcome import Outcome
 from respot.cli.outcome import run as run_command
@@ -14,6 +18,9 @@ def run(
     robot_name: options.RobotName = None,
     spot_id: options.SpotId = None,
     profile: options.Profiles = None,
+    forms: Annotated[
+        bool, typer.Option("--forms", help="Compare the copies in every inline form, however many there are.")
+    ] = False,
     as_json: options.AsJson = False,
     strict: options.Strict = False,
 ) -> None:
@@ -22,7 +29,7 @@ def run(
     def work() -> Outcome:
         from respot.backups import open_backup
         from respot.cli.show_inspect import show_robots, show_table
-        from respot.inspection import inspect_robot, inspect_table
+        from respot.inspection import form_issues, inspect_robot, inspect_table
         from respot.languages.forms import read_profile
         from respot.spots import is_backup, spots_of_robot
         from respot.tables import read_table
@@ -37,6 +44,7 @@ def run(
         records = [inspect_robot(robot, own) for robot, own in zip(robots, spots, strict=True)]
         issues = [*backup.issues, *(issue for robot in robots for issue in robot.issues)]
         issues += [issue for own in spots for issue in own.issues]
-        return Outcome("inspect", {"robots": records}, lambda: show_robots(records), issues)
+        issues += [issue for robot in robots for issue in form_issues(robot, forms)]
+        return Outcome("inspect", {"robots": records}, lambda: show_robots(records), list(dict.fromkeys(issues)))
 
     run_command(work, as_json, strict)

@@ -10,7 +10,7 @@ from scipy.spatial.transform import RigidTransform
 
 from respot.correction.chain import Chain, chain_of, stacked, standing
 from respot.correction.points import new_offset
-from respot.geometry import Array
+from respot.geometry import IDENTITY, Array
 from respot.kinematics.cell import Reason, RobotCell
 from respot.kinematics.configuration import all_solutions, nearest_inside, taught_joints
 from respot.kinematics.opw import OpwRobot
@@ -138,17 +138,17 @@ class Places:
     def _pose(self, move: Move, last: _Posed | None) -> _Posed | None:
         if move.unknown or (move.offset is not None and not move.offset.literal):
             return None
-        if move.target is not None:
-            if move.target.pose is None:
-                return None
-            target = move.target
-            own, before, after = move.target.pose, move.target.pose, self._printed.get(id(target), move.target.pose)
-        elif (
-            move.offset is not None and last is not None and (last.move.tool, last.move.base) == (move.tool, move.base)
-        ):
-            target, own, before, after = last.target, last.own, last.before, last.after
-        else:
+        start = self._start(move, last)
+        if start is None:
             return None
+        target, own, before, after = start
+        if move.tool_offset is None:
+            self.unknown.append(
+                (move, target, Reason("NOT_CHECKED", "its shift along the tool is computed at run time"))
+            )
+            return None
+        if move.tool_offset is not IDENTITY:  # status and turn or confdata are those of the bare target
+            before, after = before * move.tool_offset, after * move.tool_offset
         if move.offset is None:
             return _Posed(move, target, own, before, after)
         if move.base2spots is None:
@@ -156,6 +156,19 @@ class Places:
         old = np.array([0.0 if number is None else float(number.value) for number in move.offset.numbers])
         turned = new_offset(move.offset, move.base2spots, self._correction)
         return _Posed(move, target, own, _shifted(before, old), _shifted(after, turned))
+
+    def _start(
+        self, move: Move, last: _Posed | None
+    ) -> tuple[Target, RigidTransform, RigidTransform, RigidTransform] | None:
+        """Target with its own pose, before and after; of a relative motion where the last motion went."""
+        if move.target is not None:
+            own = move.target.pose
+            return None if own is None else (move.target, own, own, self._printed.get(id(move.target), own))
+        if move.offset is None and move.tool_offset is IDENTITY:
+            return None
+        if last is None or (last.move.tool, last.move.base) != (move.tool, move.base):
+            return None
+        return last.target, last.own, last.before, last.after
 
     def _solve(self, posed: Sequence[_Posed]) -> None:
         """Solve all motions at once."""

@@ -15,7 +15,7 @@ from scipy.spatial.transform import RigidTransform
 from respot.correction.joints import Place, Places
 from respot.correction.scope import Refusal, Scope
 from respot.correction.sequence import sequences
-from respot.geometry import Array
+from respot.geometry import IDENTITY, Array
 from respot.issues import Issue
 from respot.kinematics.cell import Reason, RobotCell
 from respot.kinematics.opw import OpwRobot
@@ -73,8 +73,7 @@ class Preflight:
         if isinstance(cell, RobotCell) and isinstance(cell.model, OpwRobot):
             self._cell, self._model = cell, cell.model
             self._sequences = [
-                [move for move in sequence if move.target is not None or move.offset is not None or move.unknown]
-                for sequence in sequences(robot, scope.routines)
+                [move for move in sequence if _goes_somewhere(move)] for sequence in sequences(robot, scope.routines)
             ]
             called = {id(move) for sequence in self._sequences for move in sequence}
             routines = [r for r in robot.routines if any(id(move) in called for move in r.moves)]
@@ -145,6 +144,12 @@ class Preflight:
         count = "the motion" if len(left) == 1 else f"{len(left)} motions, the first"
         message = f"reach, limits and joint travel of {count} to {move.target}: {reason}"
         return [Issue("NOT_CHECKED", message, move.path, move.line)]
+
+
+def _goes_somewhere(move: Move) -> bool:
+    """Whether a motion goes to a target, away from the last position, or nobody knows where."""
+    relative = move.offset is not None or move.tool_offset is not IDENTITY
+    return move.target is not None or relative or bool(move.unknown)
 
 
 def _refusal(move: Move, place: Place, reason: Reason) -> Refusal:

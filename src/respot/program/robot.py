@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 from respot.issues import Issue
+from respot.program.forms import Form
 from respot.program.frames import Frame
 from respot.program.moves import Move
 from respot.program.statement import Statement
@@ -153,6 +154,8 @@ class Robot:
         What was noticed while reading.
     task : str
         Task that moves it, where one controller moves several robots; empty otherwise. Such robots share ``root``.
+    find_forms : callable
+        Finds its inline forms, of which not every job asks.
     """
 
     name: str
@@ -166,6 +169,12 @@ class Robot:
     bases: Sequence[Frame]
     issues: Sequence[Issue]
     task: str = ""
+    find_forms: Callable[[], Sequence[Form]] = tuple
+
+    @cached_property
+    def forms(self) -> Sequence[Form]:
+        """Its inline forms, with all copies of their fields."""
+        return self.find_forms()
 
     @property
     def programs(self) -> list[str]:

@@ -128,11 +128,16 @@ def match_by_geometry(
     Raises
     ------
     RegistrationError
-        ``TOO_FEW_PAIRS`` for fewer than 4 spots in a list, ``TOO_MANY_SPOTS``; ``NOT_CONGRUENT`` where no placement
-        pairs half of the shorter list; ``AMBIGUOUS_MATCH`` where another placement is as good, or so few spots agree so
-        loosely that chance would do it.
+        ``NOT_A_NUMBER``; ``TOO_FEW_PAIRS`` for fewer than 4 spots in a list, ``TOO_MANY_SPOTS``; ``NOT_CONGRUENT``
+        where no placement pairs half of the shorter list; ``AMBIGUOUS_MATCH`` where another placement is as good, or so
+        few spots agree so loosely that chance would do it.
     """
     first, second = np.asarray(source, dtype=np.float64), np.asarray(reference, dtype=np.float64)
+    for which, points in (("source", first), ("reference", second)):
+        broken = np.flatnonzero(~np.isfinite(points).all(axis=1))
+        if len(broken):
+            message = f"a coordinate is not a finite number in row {broken[0] + 1} of the {which} list"
+            raise RegistrationError("NOT_A_NUMBER", message, rows=tuple(int(row) for row in broken))
     shorter = min(len(first), len(second))
     if shorter < 4:
         raise RegistrationError("TOO_FEW_PAIRS", f"{shorter} spots in a list: geometry needs at least 4 in both")

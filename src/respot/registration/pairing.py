@@ -86,7 +86,7 @@ def pair_spots(
         try:
             pairing = _by_place(source_ids, source, reference_ids, reference, by_name, same_frame, seed)
         except RegistrationError as error:
-            if error.code == "UNIT_MISMATCH":
+            if error.code in ("UNIT_MISMATCH", "NOT_A_NUMBER"):
                 raise
             if not by_name.ids:
                 raise RegistrationError(

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from respot.languages.forms import read_profile
 from respot.languages.rapid.calls import read_lines
@@ -98,7 +100,7 @@ def test_turns_of_reltool_are_about_x_then_the_new_y_then_the_new_z():
 
 def test_scopes():
     robot = robot_of("scopes", more=module("    MoveL p1,v1,z1,tGun;\n    MoveL p2,v1,z1,tGun;", name="n"))
-    local, own = [move for move in moves_of_module(robot, "m", "main")]
+    local, own = moves_of_module(robot, "m", "main")
     assert world(local) == pytest.approx([1000, 1, 500])
     assert world(own) == pytest.approx([1000, 3, 500])
     shared, nowhere, again = moves_of(robot, "other")
@@ -184,6 +186,26 @@ def test_wrappers():
     assert {move.line for move in moves} == {6, 7, 8, 9, 10, 11, 12, 13, 14, 15}
 
 
+@given(
+    place=st.tuples(*[st.integers(-2000, 2000)] * 3),
+    depth=st.integers(0, 6),
+    frames=st.sampled_from([("tGun", "\\WObj:=wTable"), ("tGun", ""), ("tStand", "\\WObj:=wPart")]),
+)
+def test_wrappers_within_wrappers_change_nothing(place, depth, frames):
+    tool, wobj = frames
+    chain = "".join(
+        f"  PROC w{level}(robtarget p,PERS tooldata t\\PERS wobjdata WObj)\n"
+        f"    {f'w{level - 1} p,t' if level else 'MoveL p,v1,z1,t'}\\WObj?WObj;\n  ENDPROC\n"
+        for level in range(depth + 1)
+    )
+    target = f"[[{place[0]},{place[1]},{place[2]}],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
+    body = f"    MoveL {target},v1,z1,{tool}{wobj};\n    w{depth} {target},{tool}{wobj};"
+    direct, wrapped = moves_of(robot_of(more=module(body, chain)))
+    assert wrapped.spot_pose.translation == pytest.approx(direct.spot_pose.translation)
+    assert (wrapped.tool, wrapped.base, wrapped.external_tcp) == (direct.tool, direct.base, direct.external_tcp)
+    assert wrapped.codes == direct.codes == ()
+
+
 def test_a_wrapper_moves_nothing_where_it_stands():
     robot = robot_of("wrappers")
     wrappers = [found for found in robot.routines if found.name.startswith("mv") or found.name == "goHome"]
@@ -196,6 +218,13 @@ def test_a_wrapper_that_nobody_calls_keeps_its_own_target():
     robot = robot_of(more=module("", data))
     (move,) = moves_of(robot, "goHome")
     assert (move.target.name, move.codes) == ("pOwn", ("UNKNOWN_TOOL",))
+
+
+def test_an_offset_in_a_wrapper_is_one_literal_for_all_its_calls():
+    data = "  CONST robtarget pOwn:=[[1,0,0],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n"
+    data += "  PROC up(PERS tooldata t)\n    MoveJ Offs(pOwn,0,0,9),v1,fine,t\\WObj:=wTable;\n  ENDPROC\n"
+    robot = robot_of(more=module("    up tGun;\n    up tGun;", data))
+    assert [move.codes for move in moves_of(robot)] == [("RUN_TIME_POSE",)] * 2
 
 
 def test_a_routine_that_calls_itself_ends():
@@ -291,7 +320,7 @@ def test_persistent_frames_without_a_value_take_it_from_another_task():
     target = "[[1,2,3],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
     body = f"    MoveL {target},v1,z1,tGun\\WObj:=wTable;\n    MoveL {target},v1,z1,tGun\\WObj:=wFloor;"
     files = {"RAPID/TASK2/PROGMOD/m.mod": module(body, data)["RAPID/TASK1/PROGMOD/m.mod"]}
-    shared, own = [move for move in robot_of(more=files).moves()]
+    shared, own = robot_of(more=files).moves()
     assert world(shared) == pytest.approx([998, 1, 503])
     assert own.codes == ("UNKNOWN_FRAME",)
 

@@ -27,6 +27,13 @@ def frame_pose(aggregate: Aggregate) -> RigidTransform | None:
     return pose(values[:3], rotation_from_abc(values[3:]))
 
 
+def shift_of(aggregate: Aggregate) -> RigidTransform | None:
+    """Shift of a relative motion, in which a component that is left out is zero; None where one is no number."""
+    values = [aggregate.number(name) if name in aggregate.members else 0.0 for name in "XYZABC"]
+    known = [value for value in values if value is not None]
+    return pose(known[:3], rotation_from_abc(known[3:])) if len(known) == 6 else None
+
+
 class Frames:
     """The numbered tools, bases and loads of a robot; one object for each number.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import PurePosixPath
 
@@ -11,7 +11,7 @@ from respot.languages.forms import Forms
 from respot.languages.krl import blocks, machine
 from respot.languages.krl.binding import Binder
 from respot.languages.krl.controller import read_facts
-from respot.languages.krl.forms import FORMS
+from respot.languages.krl.forms import FORMS, Data, read_forms
 from respot.languages.krl.frames import Frames
 from respot.languages.krl.recognition import recognise
 from respot.languages.krl.run_time import read_run_time
@@ -20,6 +20,7 @@ from respot.languages.krl.syntax import ENCODINGS, read_statements
 from respot.languages.krl.targets import Targets
 from respot.languages.layout import live_programs
 from respot.languages.reading import opaque_issues
+from respot.program.forms import Form
 from respot.program.robot import Fact, Machine, ProgramFile, Robot
 from respot.source import SourceText
 
@@ -79,8 +80,14 @@ def read_robots(name: str, root: str, files: Mapping[str, bytes], forms: Forms =
         tools=frames.declared("TOOL"),
         bases=frames.declared("BASE"),
         issues=issues,
+        find_forms=lambda: _forms(read, code, symbols, forms),
     )
     return [robot]
+
+
+def _forms(read: Mapping[str, ProgramFile], programs: Iterable[str], symbols: Symbols, forms: Forms) -> Sequence[Form]:
+    data = Data(symbols, {path: file.source for path, file in read.items()})
+    return [form for path in programs for form in read_forms(read[path].source, read[path].statements, data, forms)]
 
 
 def _read_file(path: str, data: bytes) -> ProgramFile:

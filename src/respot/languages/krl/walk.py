@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 from respot.languages.forms import Forms
 from respot.languages.krl.blocks import Routine as Block
+from respot.languages.krl.frames import shift_of
 from respot.languages.krl.labels import Fold, Folds
 from respot.languages.krl.motion_data import MotionData
 from respot.languages.krl.operands import Operand, Operands, Place
@@ -319,7 +320,10 @@ class Walk:
         if not isinstance(value, Aggregate):
             draft.operand = Operand(doubt=Doubt("RUN_TIME_POSE", f"{operand.text} is computed while the robot runs"))
             return
-        if in_tool or "A1" in value.members:
+        if "A1" in value.members:
+            return
+        if in_tool:
+            draft.operand = Operand(tool_offset=shift_of(value))
             return
         numbers: list[Number | None] = []
         for name in "XYZ":

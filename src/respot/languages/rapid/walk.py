@@ -227,6 +227,9 @@ class Walk:
             else:
                 read = replace(read, tool_offset=read.tool_offset * operand.tool_offset)
             operand = read.doubted(operand.unknown, operand.code) if operand.unknown else read
+        elif operand.offset is not None:
+            # one literal, but as many motions as there are calls
+            operand = operand.doubted(f"{call.name} adds an offset along the work object that all its callers share")
         return replace(
             draft,
             instruction=call.name,
