@@ -160,13 +160,13 @@ def _targets(aimed: Sequence[tuple[Move, Target]], ids: dict[int, str]) -> list[
         known = own[0][row]
         pose = [*own[1][row].tolist(), *abc[row].tolist(), quaternion[row].tolist()] if known else [None] * 7
         world = {**_position(in_world[1][row]), "q": world_quaternion[row].tolist()} if in_world[0][row] else None
-        part = {"part": {name: pose[index] for name, index in (("x", 0), ("y", 1), ("z", 2), ("q", 6))}}
+        part = {"part": _part(move)} if move.external_tcp and known else {}
         records.append(
             {
                 **_described(move, target, ids.get(id(target))),
                 **dict(zip(_POSE, pose, strict=True)),
                 **_configured(target),
-                **(part if move.external_tcp and known else {}),
+                **part,
                 "world": world,
             }
         )
@@ -205,7 +205,7 @@ def _in_world(aimed: Sequence[tuple[Move, Target]], own: _Poses) -> _Poses:
         positions[rows] = base.apply(positions[rows])
         quaternions[rows] = (base.rotation * Rotation.from_quat(quaternions[rows])).as_quat()
     for row, (move, _) in enumerate(aimed):
-        if known[row] and move.tool_offset is not IDENTITY:  # P:{Z -60}, RelTool
+        if known[row] and (move.tool_offset is not IDENTITY or move.offset is not None):  # P:{Z -60}, RelTool, Offs
             place = move.world
             known[row] = place is not None
             if place is not None:
@@ -217,6 +217,14 @@ def _orientations(poses: _Poses) -> tuple[Any, Any]:
     if not len(poses[0]):
         return np.zeros((0, 3)), np.zeros((0, 4))
     return abc_from_rotation(poses[2]), quaternion_from_rotation(poses[2])
+
+
+def _part(move: Move) -> Record | None:
+    """Pose of an external TCP's goal in the part frame."""
+    pose = move.spot_pose
+    if pose is None:
+        return None
+    return {**_position(pose.translation), "q": quaternion_from_rotation(pose.rotation).tolist()}
 
 
 def _position(values: Iterable[float]) -> dict[str, float]:

@@ -14,13 +14,14 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from respot.backups import Backup, open_backup
-from respot.geometry import Array
+from respot.geometry import Array, distance_mm
 from respot.issues import BadInputError, Issue
 from respot.languages import LANGUAGES
 from respot.languages.forms import read_profile
 from respot.program.moves import Move
 from respot.program.robot import Robot
 from respot.tables import Table, read_table
+from respot.tolerance import SAME_POSITION_MM
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,18 +206,33 @@ def _drop_other_frame(ids: list[str], moves: list[Move]) -> list[Issue]:
 def _doubt(spot_id: str, moves: Sequence[Move]) -> Issue | None:
     """Why a spot cannot be used."""
     first = moves[0]
-    places = {(move.target.path, move.target.span) for move in moves if move.target is not None}
-    if len(places) > 1:
+    if not all(_same_place(first, move) for move in moves[1:]):
         where = ", ".join(f"{move.path}:{move.line}" for move in moves[:4])
         return Issue("AMBIGUOUS_SPOT", f"{spot_id} is welded at several targets: {where}", first.path, first.line)
     if first.unknown:
-        return Issue("RUN_TIME_POSE", f"{spot_id}: {first.unknown}", first.path, first.line)
+        code = first.codes[0] if first.codes else "RUN_TIME_POSE"
+        return Issue(code, f"{spot_id}: {first.unknown}", first.path, first.line)
     if first.spot_pose is None:
-        reason = first.base.unknown if first.base is not None else "the program does not set it"
+        doubt = next((doubt for doubt in first.doubts if doubt.code != "UNKNOWN_TOOL"), None)
+        if doubt is not None:
+            return Issue(doubt.code, f"{spot_id}: {doubt.text}", first.path, first.line)
         if first.target is not None and first.target.unknown:
             return Issue("RUN_TIME_POSE", f"{spot_id}: {first.target.unknown}", first.path, first.line)
+        reason = first.base.unknown if first.base is not None else "the program does not set it"
         return Issue("UNKNOWN_FRAME", f"{spot_id}: base {first.base or 'unknown'}: {reason}", first.path, first.line)
     return None
+
+
+def _same_place(first: Move, second: Move) -> bool:
+    """Whether two welds are at one target and in one place."""
+    if first.target is not second.target or first.external_tcp != second.external_tcp:
+        return False
+    if first.base is second.base and first.tool_offset is second.tool_offset and first.offset is second.offset:
+        return True
+    poses = first.spot_pose, second.spot_pose
+    if poses[0] is None or poses[1] is None:
+        return poses[0] is poses[1]
+    return float(distance_mm(poses[0], poses[1])) <= SAME_POSITION_MM
 
 
 class _Chooser:

@@ -146,14 +146,20 @@ class Move:
 
     @property
     def _pose(self) -> RigidTransform | None:
-        """``target2base`` with its shift in its own axes."""
+        """``goal2base``: the target with its shifts along its own axes and along those of the base."""
         if self.target is None or self.target.pose is None or self.tool_offset is None:
             return None
-        return self.target.pose if self.tool_offset is IDENTITY else self.target.pose * self.tool_offset
+        goal = self.target.pose if self.tool_offset is IDENTITY else self.target.pose * self.tool_offset
+        if self.offset is None:
+            return goal
+        if not self.offset.literal:
+            return None
+        way = [0.0 if number is None else float(number.value) for number in self.offset.numbers]
+        return RigidTransform.from_translation(way) * goal
 
     @property
     def world(self) -> RigidTransform | None:
-        """``target2world`` of the TCP without base offset; None for an external TCP and where a frame is not known."""
+        """Where the TCP goes, in the world; None for an external TCP and where a frame is not known."""
         if self.external_tcp or self._pose is None or self.base is None or self.base.pose is None:
             return None
         return self.base.pose * self._pose

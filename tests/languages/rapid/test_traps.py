@@ -15,7 +15,7 @@ from respot.program.statement import OPAQUE, Branch, Node, Statement
 from respot.source import SourceText
 
 DATA = Path(__file__).resolve().parents[2] / "data" / "rapid"
-TRAPS = sorted(path for path in DATA.iterdir() if path.suffix != ".tree")
+TRAPS = sorted(path for path in DATA.iterdir() if path.is_file() and path.suffix != ".tree")
 #: Files that the plain grammar, which takes every line for a statement, cannot read as a whole.
 NOT_PLAIN = {"several_modules.prg"}
 

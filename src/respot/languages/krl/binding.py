@@ -203,7 +203,9 @@ class Binder:
         doubts = [] if draft.operand.doubt is None else [draft.operand.doubt]
         unknown = draft.operand.doubt.text if draft.operand.doubt is not None else ""
         if draft.operand.tool_offset is None:  # the target itself can be corrected all the same
-            doubts.append(Doubt("RUN_TIME_POSE", f"what shifts {target or draft.instruction} is computed while the robot runs"))
+            doubts.append(
+                Doubt("RUN_TIME_POSE", f"what shifts {target or draft.instruction} is computed while the robot runs")
+            )
         if needs_base:
             doubts += self._doubts(state)
             if isinstance(state.external, Why):
