@@ -1,8 +1,8 @@
-"""For how many motions of many backups are target, base and tool known, and why not for the rest?
+"""Count for how many motions of many backups target, base and tool are known, and why they are not for the rest.
 
-Usage: ``python scripts/binding_coverage.py PATH... [--reasons 12]``. A PATH is a backup (folder or zip) or a folder of such;
-give the folder of one controller or of one repository. Motions to joints and motions relative to the last position need
-no base and are counted apart.
+Usage: ``python scripts/binding_coverage.py PATH... [--reasons 12]``. A PATH is a backup (folder or zip) or a folder of
+such; give the folder of one controller or of one repository. Motions to joints and motions relative to the last
+position need no base and are counted apart.
 """
 
 from __future__ import annotations

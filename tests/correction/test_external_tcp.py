@@ -111,7 +111,9 @@ def test_rapid_targets_of_a_held_work_object_move_by_the_deviation_itself(tmp_pa
 
 
 def test_rapid_offs_on_a_held_part_turns_with_it(tmp_path):
-    done = convert(tmp_path, rapid_held_part(body="    MoveL Offs(S1,10,0,0),v100,z10,tFixed\\WObj:=wPart;\n"), "--keep-config")
+    done = convert(
+        tmp_path, rapid_held_part(body="    MoveL Offs(S1,10,0,0),v100,z10,tFixed\\WObj:=wPart;\n"), "--keep-config"
+    )
     assert done.code == 0, done.err
     numbers = re.search(r"Offs\(S1,([^,]+),([^,]+),([^)]+)\)", done.text("Weld.mod")).groups()
     assert [float(number) for number in numbers] == pytest.approx(TURN @ [10, 0, 0], abs=6e-4)

@@ -128,7 +128,7 @@ def test_a_point_that_the_program_changes_is_refused(tmp_path, code):
 
 def test_an_undeclared_point_is_refused(tmp_path):
     done = convert(tmp_path, krl(body=lin("NONE"), data=fdat("NONE")))
-    assert {code for _, _, code in done.refusals()} == {"RUN_TIME_POSE"}
+    assert {code for _, _, code in done.refusals()} == {"UNKNOWN_TARGET"}
 
 
 def test_one_point_under_two_bases_is_refused(tmp_path):
@@ -286,7 +286,7 @@ def test_a_global_point_of_the_robots_own_folder_wins_over_a_copy(tmp_path):
 def test_a_global_point_that_stands_twice_is_refused(tmp_path):
     shared = "DEFDAT SHARED PUBLIC\n" + krl_point("G1", 10, 20, 30, kind="GLOBAL E6POS") + "ENDDAT\n"
     files = krl(body=lin("G1"), data=fdat("G1"), more={"shared.dat": shared, "other.dat": shared})
-    assert {(program, code) for program, _, code in convert(tmp_path, files).refusals()} == {("weld", "RUN_TIME_POSE")}
+    assert {(program, code) for program, _, code in convert(tmp_path, files).refusals()} == {("weld", "AMBIGUOUS_NAME")}
 
 
 def test_names_that_differ_in_case_only_are_refused(tmp_path):
@@ -441,7 +441,7 @@ def test_a_program_that_comes_without_its_config_goes_home_all_the_same(tmp_path
     files = krl(body="PTP XHOME1\n")
     assert convert(tmp_path, files).code == 0
     elsewhere = krl(body="PTP XAWAY\n")
-    assert convert(tmp_path / "away", elsewhere).refusals() == {("weld", "PTP@19", "RUN_TIME_POSE")}
+    assert convert(tmp_path / "away", elsewhere).refusals() == {("weld", "PTP@19", "UNKNOWN_TARGET")}
 
 
 def test_a_dresser_under_a_base_that_nobody_set_stays(tmp_path):

@@ -350,3 +350,14 @@ def test_what_writes_into_a_target_makes_it_a_run_time_pose(tmp_path, code):
     done = run(tmp_path, rapid(body=f"    {code}\n" + MOVE, data=data, after=routine))
     assert "p1" not in done.edited()
     assert "RUN_TIME_POSE" in {found for _, _, found in done.refusals()}
+
+
+def test_the_original_of_a_touched_up_target_moves_with_it(tmp_path):
+    """Option "Absolute Limit ModPos" compares both: left behind, the next touch-up is refused (facts: rapid.md 2.4)."""
+    data = f"  CONST o_robtarget o_S1:={robtarget(*krl_in_base1((1001, 0, 500)))};\n"
+    data += f"  CONST o_robtarget o_P9:={robtarget(7, 8, 9)};\n"
+    done = run(tmp_path, rapid(data=data))
+    assert done.code == 0, done.err
+    place = xyz(done.text("Weld.mod"), "o_S1:=")
+    assert place == pytest.approx(krl_in_base1(moved((1001, 0, 500))), abs=6e-4)
+    assert done.stays()["o_P9"] == "NOT_REACHED"

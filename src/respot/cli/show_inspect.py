@@ -70,10 +70,8 @@ def _counted(count: Mapping[str, Any]) -> str:
         parts.append(f"{_plural(count['joints'], 'motion')} to joints")
     if count["unresolved"]:
         parts.append(f"{_plural(count['unresolved'], 'motion')} to nobody knows where")
-    for kind in ("tools", "bases"):
-        if count[kind]:
-            parts.append(f"{kind} {', '.join(count[kind])}")
-    return "; ".join(parts)
+    frames = [f"{kind} {', '.join(count[kind])}" for kind in ("tools", "bases") if count[kind]]
+    return "; ".join([*parts, *frames])
 
 
 def _plural(number: int, word: str) -> str:

@@ -127,6 +127,7 @@ class _Finder:
             self._wide |= sharing
         for target in self._robot.targets:
             self._decide_target(scope, target, uses.get(id(target), []))
+        _take_originals(scope)
         return scope
 
     def _decide_moves(self) -> tuple[Scope, dict[int, list[Move]]]:
@@ -186,7 +187,7 @@ class _Finder:
         if move.target is not None and move.target.kind is TargetKind.JOINTS:
             return None
         if move.target is None and move.offset is None:
-            return refuse("RUN_TIME_POSE", move.unknown) if move.unknown else None
+            return refuse(_code_of(move), move.unknown) if move.unknown else None
         if move.workpiece is None:
             what = "what the robot holds" if move.external_tcp else "the base of this motion"
             return refuse("UNKNOWN_FRAME", move.unknown or f"the program does not tell {what}")
@@ -210,7 +211,7 @@ class _Finder:
         if not self._moves(move, routine):
             return None
         if move.unknown:
-            return refuse("RUN_TIME_POSE", move.unknown)
+            return refuse(_code_of(move), move.unknown)
         if move.target is not None and move.target.pose is None:
             return refuse("RUN_TIME_POSE", move.target.unknown)
         if move.offset is not None and not move.offset.literal:
@@ -242,6 +243,16 @@ class _Finder:
         scope.moving.append(Moving(target, first.base2spots, everywhere))
 
 
+def _take_originals(scope: Scope) -> None:
+    """Move the original of a touched-up target with it: a controller that limits touch-ups compares the two."""
+    moving = {(item.target.path, item.target.name.lower()): item for item in scope.moving}
+    for stay in [stay for stay in scope.stays if stay.target.original_of]:
+        twin = moving.get((stay.target.path, stay.target.original_of.lower()))
+        if twin is not None and stay.code == "NOT_REACHED" and stay.target.pose is not None:
+            scope.stays.remove(stay)
+            scope.moving.append(Moving(stay.target, twin.base2spots, twin.moves))
+
+
 @dataclass(frozen=True, eq=False)
 class _Part:
     """The frame that carries the part of a matched spot."""
@@ -267,6 +278,11 @@ def _same_use(first: Move, second: Move) -> bool:
     if first.external_tcp != second.external_tcp or frames[0] is None or frames[1] is None:
         return False
     return _same(frames[0], frames[1])
+
+
+def _code_of(move: Move) -> str:
+    """Code of why the goal of a motion is not known."""
+    return next((doubt.code for doubt in move.doubts if doubt.text == move.unknown), "RUN_TIME_POSE")
 
 
 def _is_world(base: Frame | None) -> bool:

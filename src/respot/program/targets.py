@@ -56,6 +56,9 @@ class Target:
         Why there is no pose.
     declared : bool
         It has a name of its own.
+    original_of : str
+        Name of the target that was this one before it was touched up: a controller that limits touch-ups compares
+        both (facts: rapid.md 2.4).
     """
 
     name: str
@@ -69,6 +72,7 @@ class Target:
     components: tuple[float, ...] = ()
     unknown: str = ""
     declared: bool = True
+    original_of: str = ""
 
     @cached_property
     def pose(self) -> RigidTransform | None:

@@ -7,6 +7,7 @@ else is none (facts: rapid.md 1.4, 1.5).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from decimal import Decimal, InvalidOperation
 from math import isfinite, sqrt
 from typing import NamedTuple, TypeAlias
@@ -63,6 +64,10 @@ class _Numbers(Mapping[str, Number]):
 
     def __len__(self) -> int:
         return len(self._numbers)
+
+
+#: What keeps the original of a touched-up target, and how its name begins (facts: rapid.md 2.4).
+_ORIGINAL, _PREFIX = "o_robtarget", "o_"
 
 
 class Targets(TargetTable):
@@ -154,7 +159,10 @@ class Targets(TargetTable):
         key = (path, span[0])
         found = self._targets.get(key)
         if found is None:
-            found = self._targets[key] = self._make(name, path, node, span, place, declared)
+            found = self._make(name, path, node, span, place, declared)
+            if kind == _ORIGINAL and name.lower().startswith(_PREFIX):
+                found = replace(found, original_of=name[len(_PREFIX) :])
+            self._targets[key] = found
         return found
 
     def _make(self, name: str, path: str, node: Node, span: Span, place: _Place, declared: bool) -> Target:
