@@ -311,3 +311,9 @@ def test_frames_of_vkrc_are_not_known():
     (move,) = moves("vkrc_form")
     assert move.codes == ("UNKNOWN_FRAME", "UNKNOWN_TOOL")
     assert "RobWzg=1 Base=0" in texts(move, LabelKind.TITLE)[0]
+
+
+def test_the_spot_of_vkrc_is_in_a_fold_below_the_motion():
+    (move,) = moves("vkrc_form")
+    assert move.weld
+    assert move.spot_ids[0] == "10067"

@@ -273,6 +273,8 @@ class Walk:
             if form.title and form is not step.form and self._is_inline(form):
                 return
             step.weld = True
+            if form is not step.form and form.title:  # VKRC: a fold within the point's own names the spot
+                step.labels.append(Label(LabelKind.PARAMS, form.title))
             step.labels += self._weld_labels(form, arguments)
             return
 
