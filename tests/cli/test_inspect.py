@@ -93,7 +93,7 @@ def test_a_motion_to_nobody_knows_where_is_listed(respot, krl):
     (lost,) = result.json["robots"][0]["unresolved"]
     assert (lost["path"], lost["line"]) == ("KRC/R1/Program/a.src", 9)
     assert "XNOWHERE" in lost["reason"]
-    assert "1 motion to nobody knows where" in respot("inspect", krl).out
+    assert "1 motion to a place that is not known" in respot("inspect", krl).out
 
 
 def test_the_spot_id_of_an_option_is_searched_in_the_whole_name(respot, krl):

@@ -65,11 +65,11 @@ def _holds(count: Mapping[str, Any]) -> bool:
 
 
 def _counted(count: Mapping[str, Any]) -> str:
-    parts = [_plural(count["spots"], "spot"), _plural(count["targets"], "target")]
+    parts = [_plural(count["spots"], "spot"), f"{_plural(count['targets'], 'motion')} to points"]
     if count["joints"]:
         parts.append(f"{_plural(count['joints'], 'motion')} to joints")
     if count["unresolved"]:
-        parts.append(f"{_plural(count['unresolved'], 'motion')} to nobody knows where")
+        parts.append(f"{_plural(count['unresolved'], 'motion')} to a place that is not known")
     frames = [f"{kind} {', '.join(count[kind])}" for kind in ("tools", "bases") if count[kind]]
     return "; ".join([*parts, *frames])
 
