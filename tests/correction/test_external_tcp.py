@@ -79,6 +79,12 @@ def test_krl_a_held_gun_with_a_point_the_other_way_round_refuses_the_program(tmp
     assert done.refusals() == {("weld", "XP1", "EXTERNAL_TCP")}
 
 
+def test_krl_a_shift_along_the_base_of_a_fixed_gun_is_refused(tmp_path):
+    done = convert(tmp_path, krl_held_part(body="LIN_REL {Z 5.0} #BASE\n"))
+    assert {code for _, _, code in done.refusals()} == {"EXTERNAL_TCP"}
+    assert not done.edited()
+
+
 def test_krl_a_point_used_both_ways_is_refused(tmp_path):
     body = "FDAT_ACT=FBOTH\nBAS(#CP_PARAMS,1)\nLIN XS1\n"
     both = 'DECL FDAT FBOTH={TOOL_NO 2,BASE_NO 5,IPO_FRAME #BASE,POINT2[] " "}\n'

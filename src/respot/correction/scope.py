@@ -210,6 +210,9 @@ class _Finder:
             return refuse("EXTERNAL_TCP", message)
         if not self._moves(move, routine):
             return None
+        if move.offset is not None and move.external_tcp and self._robot.language == "krl":
+            message = "a shift along the base of a fixed gun: it is not documented along which axes the part moves"
+            return refuse("EXTERNAL_TCP", message)
         if move.unknown:
             return refuse(_code_of(move), move.unknown)
         if move.target is not None and move.target.pose is None:
