@@ -15,7 +15,7 @@ from pathlib import Path
 from respot.archives import Tree, read_files, read_tree
 from respot.issues import BadInputError, Issue
 from respot.languages import LANGUAGES
-from respot.languages.forms import Profile
+from respot.languages.profile import Profile
 from respot.program.robot import Robot
 from respot.trees import Controller, files_below, find_controllers, missing_parts, not_live, strays
 

@@ -64,6 +64,7 @@ def inspect_robot(robot: Robot, spots: SpotTable) -> Record:
         },
         "spots": list(spots.ids),
         "targets": _targets(aimed, ids),
+        "relative": [_relative(move) for move in moves if move.target is None and not move.unknown],
         "unresolved": [_unresolved(move) for move in moves if move.target is None and move.unknown],
     }
 
@@ -196,7 +197,8 @@ def _in_world(aimed: Sequence[tuple[Move, Target]], own: _Poses) -> _Poses:
     by_base: dict[int, list[int]] = {}
     bases: dict[int, RigidTransform] = {}
     for row, (move, _) in enumerate(aimed):
-        if own[0][row] and not move.external_tcp and move.base is not None and move.base.pose is not None:
+        sure = own[0][row] and not move.unknown and not move.external_tcp
+        if sure and move.base is not None and move.base.pose is not None:
             by_base.setdefault(id(move.base), []).append(row)
             bases[id(move.base)] = move.base.pose
     for key, rows in by_base.items():
@@ -245,10 +247,27 @@ def _described(move: Move, target: Target, spot_id: str | None) -> Record:
         "tool": None if move.tool is None else str(move.tool),
         "base": None if move.base is None else str(move.base),
         "external_tcp": move.external_tcp,
+        "offset": _shift(move),
         "load": None if move.load is None else move.load.name,
         "codes": list(move.codes),
         "doubt": _doubt(move, target),
     }
+
+
+def _shift(move: Move) -> Record | None:
+    """Shifts on top of the target: along the base, and in the target's own axes; None for a plain motion."""
+    if move.offset is None and move.tool_offset is IDENTITY:
+        return None
+    base = None
+    if move.offset is not None and move.offset.literal:
+        base = [0.0 if number is None else float(number.value) for number in move.offset.numbers]
+    tool = None
+    if move.tool_offset is not None and move.tool_offset is not IDENTITY:
+        tool = {
+            **_position(move.tool_offset.translation),
+            "q": quaternion_from_rotation(move.tool_offset.rotation).tolist(),
+        }
+    return {"base": base, "tool": tool}
 
 
 def _doubt(move: Move, target: Target) -> str | None:
@@ -257,9 +276,12 @@ def _doubt(move: Move, target: Target) -> str | None:
         return None
     if move.unknown or target.unknown:
         return move.unknown or target.unknown
+    told = next((doubt.text for doubt in move.doubts if doubt.code != "UNKNOWN_TOOL"), None)
+    if told is not None or (move.tool_offset is not None and move.base2spots is not None):
+        return told
     if move.base2spots is None:
         return "the program does not tell the base" if move.base is None else f"{move.base}: {move.base.unknown}"
-    return None
+    return "what shifts the target along the tool is computed while the robot runs"
 
 
 def _configured(target: Target) -> Record:
@@ -276,6 +298,19 @@ def _configured(target: Target) -> Record:
         "status": _whole(numbers.get("s")),
         "turn": _whole(numbers.get("t")),
         "confdata": [_whole(numbers[name]) for name in ("cf1", "cf4", "cf6", "cfx")] if "cf1" in numbers else None,
+    }
+
+
+def _relative(move: Move) -> Record:
+    """A motion away from the last position, or to joints that the backup does not hold."""
+    return {
+        "instruction": move.instruction,
+        "program": move.program,
+        "routine": move.routine,
+        "path": move.path,
+        "line": move.line,
+        "offset": _shift(move),
+        "codes": list(move.codes),
     }
 
 

@@ -17,7 +17,7 @@ from respot.backups import Backup, open_backup
 from respot.geometry import Array, distance_mm
 from respot.issues import BadInputError, Issue
 from respot.languages import LANGUAGES
-from respot.languages.forms import read_profile
+from respot.languages.profile_file import read_profile
 from respot.program.moves import Move
 from respot.program.robot import Robot
 from respot.tables import Table, read_table

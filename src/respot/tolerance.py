@@ -20,6 +20,9 @@ SAME_ROTATION_DEG = 1e-9
 #: |q| of a programmed quaternion may differ from 1 by this much; pendants print six digits.
 QUATERNION_NORM = 1e-3
 
+#: KRL's numbers to the base 2, 16 and 10: ``'B0101'``, ``'H1F'``, ``'D10'`` (krl.md section 1).
+_BASED = re.compile(r"'([BbHhDd])([0-9A-Fa-f]+)'")
+_FORMATS = {"B": "b", "H": "X", "D": "d"}
 _NUMBER = re.compile(r"([+-]?)(\s*)([0-9]*)(\.?)([0-9]*)(?:([eE])([+-]?)([0-9]+))?")
 
 
@@ -41,6 +44,8 @@ class NumberStyle:
         A written ``+`` or, for a negative zero, ``-``.
     gap : str
         Blanks between sign and digits.
+    base : str
+        Letter of a KRL number to a base, as written: ``B`` of ``'B0101'``; empty for a decimal number.
     """
 
     decimals: int
@@ -49,6 +54,7 @@ class NumberStyle:
     exponent: str = ""
     sign: str = ""
     gap: str = ""
+    base: str = ""
 
     @classmethod
     def of(cls, text: str) -> NumberStyle:
@@ -59,6 +65,9 @@ class NumberStyle:
         ValueError
             The text is no decimal number.
         """
+        based = _BASED.fullmatch(text)
+        if based is not None:
+            return cls(0, point=False, digits=len(based[2]), base=based[1])
         match = _NUMBER.fullmatch(text)
         if match is None or not (match[3] or match[5]):
             raise ValueError(f"{text!r} is no number")
@@ -75,6 +84,8 @@ class NumberStyle:
 
     def at_least(self, decimals: int) -> NumberStyle:
         """Style for a changed number: the source's decimals, but never fewer than asked for and without exponent."""
+        if self.base:
+            return self
         own = self.decimals - int(self.exponent[1:] or 0) if self.exponent else self.decimals
         count = min(max(own, decimals), max(MOST_DECIMALS, decimals))
         return NumberStyle(count, point=count > 0)
@@ -94,6 +105,9 @@ def spell(value: Decimal | float, style: NumberStyle) -> str:
     '9E+09'
     """
     exact = value if isinstance(value, Decimal) else Decimal(repr(float(value)))
+    if style.base:
+        digits = format(round(exact), _FORMATS[style.base.upper()]).rjust(style.digits, "0")
+        return f"'{style.base}{digits}'"
     if style.exponent:
         exact = exact.scaleb(-int(style.exponent[1:]))
     text = f"{exact.copy_abs():.{style.decimals}f}"

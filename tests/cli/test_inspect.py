@@ -93,7 +93,7 @@ def test_a_motion_to_nobody_knows_where_is_listed(respot, krl):
     (lost,) = result.json["robots"][0]["unresolved"]
     assert (lost["path"], lost["line"]) == ("KRC/R1/Program/a.src", 9)
     assert "XNOWHERE" in lost["reason"]
-    assert "1 motion to a place that is not known" in respot("inspect", krl).out
+    assert "1 motion whose goal the program computes or does not tell" in respot("inspect", krl).out
 
 
 def test_the_spot_id_of_an_option_is_searched_in_the_whole_name(respot, krl):
@@ -144,3 +144,38 @@ def test_a_table(respot):
     assert (len(spots), spots[0]["id"]) == (14, "P02WP1615438")
     assert [spots[0][name] for name in "xyz"] == [4324.31, 28.43, 1276.51]
     assert "spots: 14" in respot("inspect", SAMPLES / "theory.csv").out
+
+
+def test_what_is_not_sure_has_no_place_in_the_world_and_a_mark(respot, krl):
+    """The point is declared with numbers, but the program computes it before it goes there."""
+    source = krl / "KRC/R1/Program/a.src"
+    source.write_text(KRL["KRC/R1/Program/a.src"].replace("PTP XS1", "XS1=$POS_ACT\nPTP XS1"))
+    target = by_name(respot("inspect", krl, "--json"))["XS1"]
+    assert target["world"] is None and target["codes"] == ["RUN_TIME_POSE"] and "assigned" in target["doubt"]
+    assert "XS1 (?)" in respot("inspect", krl).out
+
+
+def test_a_shift_on_top_of_a_target_is_said_and_is_in_the_world(respot, krl):
+    """(10, 20, 30) at A -90 under a base at A 90: the tool's axes are those of the world."""
+    source = krl / "KRC/R1/Program/a.src"
+    shifted = "PTP XS1:{X 1,Y 2,Z 3,A 0,B 0,C 0}"
+    source.write_text(KRL["KRC/R1/Program/a.src"].replace("PTP XS1", shifted))
+    target = by_name(respot("inspect", krl, "--json"))["XS1"]
+    assert [target[name] for name in "xyz"] == pytest.approx([10, 20, 30])
+    assert [target["world"][name] for name in "xyz"] == pytest.approx([981, 12, 533])
+    assert [target["offset"]["tool"][name] for name in "xyz"] == [1, 2, 3]
+
+
+def test_a_relative_motion_is_listed(respot, krl):
+    source = krl / "KRC/R1/Program/a.src"
+    source.write_text(KRL["KRC/R1/Program/a.src"].replace("LIN XNOWHERE", "LIN_REL {Z 5.0} #BASE"))
+    (motion,) = respot("inspect", krl, "--json").json["robots"][0]["relative"]
+    assert (motion["line"], motion["offset"]) == (9, {"base": [0, 0, 5], "tool": None})
+
+
+def test_status_and_turn_as_bits(respot, krl):
+    """krl.md 1: 'B010' is a number; many backups write S and T so."""
+    data = krl / "KRC/R1/Program/a.dat"
+    data.write_text(KRL["KRC/R1/Program/a.dat"].replace("S 2,T 3", "S 'B010',T 'B000011'"))
+    target = by_name(respot("inspect", krl, "--json"))["XS1"]
+    assert (target["status"], target["turn"]) == (2, 3)

@@ -298,3 +298,12 @@ def test_a_shift_along_the_tool_must_be_in_reach(convert, way, far):
     done = convert({**files, **machine()}, shift=60.0 * heading)
     assert done.code == int(far), done.err
     assert done.refusals() == ({("weld", "XS1", "OUT_OF_REACH")} if far else set())
+
+
+def test_status_and_turn_written_as_bits_stay_bits(convert):
+    """Axis 1 goes from 1 to -1 degrees: bit 0 of T is set; the literal keeps its base and its width."""
+    joints = (1, *GOOD[1:])
+    done = convert({**program(ptp("P1"), point("P1", joints, "'B00000010'", "'B100010'")), **machine()}, a1=-2.0)
+    assert done.code == 0, done.err
+    literal = next(line for line in done.text("weld.dat").splitlines() if "XP1=" in line)
+    assert "S 'B00000010',T 'B100011'" in literal

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from respot.registration.affine import fit_affine
 from respot.registration.alternatives import fit_translation
@@ -224,3 +225,52 @@ def test_covariance_predicts_the_scatter_of_the_transform():
     at = np.array([[5000.0, 900, 2000], centroid])
     images = np.array([fit_rigid(source, source + rng.normal(size=source.shape)).predict(at) for _ in range(2000)])
     np.testing.assert_allclose(images.var(axis=0).mean(axis=1), leverage(at, source), rtol=0.1)
+
+
+@pytest.mark.parametrize("stray", [0.0, 0.05])
+def test_two_tight_clusters_are_a_line(stray):
+    rng = np.random.default_rng(12)
+    source = np.repeat([[0.0, 0, 0], [900, 500, 0]], 6, axis=0) + stray * rng.normal(size=(12, 3))
+    with pytest.raises(DegenerateError, match=r"lie on one line .* rotation about that line is not determined"):
+        fit_rigid(source, source + 1.0)
+
+
+def test_a_plane_is_enough_and_says_that_it_is_one():
+    rng = np.random.default_rng(13)
+    flat = rng.uniform(-1, 1, (9, 3)) * [800, 400, 0]
+    fit = fit_rigid(flat, flat * [1, 1, -1] + [0, 0, 7])
+    assert fit.rank == 2
+    assert not fit.mirrored  # a flat part looks the same in the mirror
+    np.testing.assert_allclose(fit.rotation, np.eye(3), atol=1e-12)
+    assert fit_rigid(flat + rng.normal(size=(9, 3)) * 20, flat).rank == 3
+
+
+def test_pairs_that_agree_along_one_direction_alone():
+    """Two crosses, one of them upside down in the other's plane: nothing tells the turn about their common beam."""
+    beam = np.array([[-300.0, 0, 0], [300, 0, 0]])
+    source = np.vstack([beam, [[0, 100, 0], [0, -100, 0], [0, 0, 0], [0, 0, 0]]])
+    reference = np.vstack([beam, [[0, 0, 0], [0, 0, 0], [0, 100, 0], [0, -100, 0]]])
+    with pytest.raises(DegenerateError, match="do not correspond along more than one direction"):
+        fit_rigid(source, reference)
+
+
+def test_a_large_table_is_summed_block_by_block(points):
+    rng = np.random.default_rng(14)
+    source, error = cloud(rng, 10_001)
+    reference = points.move(source, points.turn((1, 1, 0), 10), (5, 6, 7)) + error
+    weights = rng.uniform(0, 2, 10_001)
+    fit = fit_rigid(source, reference, weights)
+    middle, target = np.average(source, axis=0, weights=weights), np.average(reference, axis=0, weights=weights)
+    other, _ = Rotation.align_vectors(reference - target, source - middle, weights=weights)
+    np.testing.assert_allclose(fit.rotation, other.as_matrix(), atol=1e-10)
+    np.testing.assert_allclose(fit.residuals, other.apply(source - middle) + target - reference, atol=1e-6)
+
+
+def test_leverage_is_the_mean_variance_of_the_three_coordinates():
+    rng = np.random.default_rng(15)
+    fitted, at = rng.normal(size=(7, 3)) * [900, 30, 200], rng.normal(size=(5, 3)) * 1000
+    rows = jacobian(fitted - fitted.mean(axis=0)).reshape(-1, 6)
+    inverse = np.linalg.inv(rows.T @ rows)
+    np.testing.assert_allclose(unit_covariance(fitted)[0], inverse, rtol=1e-6, atol=1e-12)
+    expected = [np.trace(row @ inverse @ row.T) / 3 for row in jacobian(at - fitted.mean(axis=0))]
+    np.testing.assert_allclose(leverage(at, fitted), expected, rtol=1e-9)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from scipy import stats
 
 from respot.registration.errors import DegenerateError, RegistrationError
 from respot.registration.rigid import fit_rigid
@@ -127,3 +128,48 @@ def test_inliers_on_a_line_and_too_few_pairs():
         fit_robust(source, reference)
     with pytest.raises(RegistrationError, match="at least 4"):
         fit_robust(source[:3], reference[:3])
+
+
+@pytest.mark.parametrize("n", [8, 14])
+@pytest.mark.parametrize("bad", [0.0, 0.25])
+def test_intervals_of_small_tables_hold(n, bad):
+    """95 % of them, by Student's t over the inliers; with a good spot in ten thrown out it is 92 %."""
+    rng = np.random.default_rng(16)
+    held = []
+    for _ in range(400):
+        source, reference, true, _ = table(rng, n, bad=bad)
+        fit = fit_robust(source, reference)
+        inliers = fit.inliers
+        free = 3 * int(inliers.sum()) - 6
+        variance = np.sum(fit.rigid.residuals[inliers] ** 2) / free
+        shift = (fit.rigid.predict(source) - true)[inliers].mean(axis=0)
+        held.append(np.abs(shift) <= stats.t.ppf(0.975, free) * np.sqrt(variance / inliers.sum()))
+    assert 0.93 <= np.mean(held) <= 0.97
+
+
+def test_bad_spots_of_small_tables_stay_out():
+    rng = np.random.default_rng(17)
+    kept = 0
+    for _ in range(150):
+        source, reference, _, wrong = table(rng, 8, bad=0.25)
+        kept += int(fit_robust(source, reference).inliers[wrong].sum())
+    assert kept <= 3
+
+
+def test_threshold_is_what_the_inliers_say():
+    source, reference, _, wrong = table(np.random.default_rng(18), 30, bad=0.2)
+    fit = fit_robust(source, reference)
+    assert np.array_equal(fit.inliers, ~wrong)
+    scale = np.sqrt(np.sum(fit_rigid(source, reference, 1.0 - wrong).residuals[~wrong] ** 2) / (3 * 24 - 6))
+    assert fit.scale == pytest.approx(scale)
+    assert fit.threshold == pytest.approx(scale * np.sqrt(3 * stats.f.ppf(0.999, 3, 66)))
+
+
+def test_one_order_of_rows_is_as_good_as_another_in_a_large_table(points):
+    rng = np.random.default_rng(19)
+    source, reference, _, _ = table(rng, 30_000, bad=0.3)
+    order = rng.permutation(30_000)
+    fit, other = fit_robust(source, reference), fit_robust(source[order], reference[order])
+    assert np.mean(other.inliers != fit.inliers[order]) < 1e-4
+    assert np.array_equal(fit.inliers, np.linalg.norm(fit.rigid.residuals, axis=1) <= fit.threshold)
+    np.testing.assert_allclose(other.rigid.predict(source), fit.rigid.predict(source), atol=1e-3)

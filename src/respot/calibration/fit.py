@@ -10,18 +10,24 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from respot.calibration.calibration import Calibration, Frame, Kind
-from respot.calibration.effects import swapped_ids
+from respot.calibration.effects import swapped_ids, tool_offset
+from respot.calibration.effects.orientations import OrientationFit, compare_orientations
+from respot.calibration.effects.search import RIGID_ONLY, Effects, effects_of, search_effects
+from respot.calibration.effects.tool_fit import fit_tool_robust, moved_by
+from respot.calibration.effects.tool_model import robust_of, uncertainty_of
 from respot.calibration.methods import affine_fit, paper_fit
 from respot.calibration.spot_fit import Method, SpotFit
 from respot.calibration.uncertainty import transform_uncertainty
 from respot.registration.affine import fit_affine
 from respot.registration.alternatives import fit_translation
+from respot.registration.congruence import congruence
 from respot.registration.errors import DegenerateError, RegistrationError
-from respot.registration.exchanged import find_exchanged
+from respot.registration.exchanged import ExchangeResult
 from respot.registration.leave_one_out import leave_one_out
-from respot.registration.matching import IdMatch, Matching
-from respot.registration.pairing import Note, pair_spots
+from respot.registration.matching import IdMatch, Matching, match_by_name
+from respot.registration.pairing import Note, Pairing, pair_spots
 from respot.registration.rigid import RigidFit, check_pairs, fit_rigid
+from respot.registration.robust import RobustFit
 from respot.registration.statistics import residual_directions
 from respot.registration.support import rotation_support
 
@@ -42,12 +48,14 @@ def fit_tables(
     kind: Kind = "theory",
     frame: Frame | None = None,
     source_rotations: Rotation | None = None,
+    reference_rotations: Rotation | None = None,
     noise: float | None = None,
     seed: int = 0,
     method: Method = "robust",
     tau: float | None = None,
     n_min: int | None = None,
     matching: Matching = "auto",
+    effects: Effects = RIGID_ONLY,
     provenance: Mapping[str, Any] | None = None,
 ) -> SpotFit:
     """Pair two lists and fit them; parameters and errors as `fit_spots`.
@@ -56,10 +64,11 @@ def fit_tables(
     ----------
     source_ids, source, source_rotations
         The spots of the programs: n names, (n, 3) [mm], n orientations.
-    reference_ids, reference
-        What they are compared with: m names, (m, 3) [mm].
+    reference_ids, reference, reference_rotations
+        What they are compared with: m names, (m, 3) [mm], m orientations.
     matching : "auto", "id" or "geometry"
-        How spots are paired; see `respot.registration.pairing.pair_spots`.
+        How spots are paired; see `respot.registration.pairing.pair_spots`. Where names and distances disagree and the
+        effect ``tool_offset`` is looked for, pairs by name are taken if an offset makes the two lists congruent.
 
     Raises
     ------
@@ -71,24 +80,75 @@ def fit_tables(
             raise RegistrationError("SHAPE_MISMATCH", f"{which}: {len(ids)} names for points {np.shape(points)}")
     first, second = np.asarray(source, dtype=np.float64), np.asarray(reference, dtype=np.float64)
     same_frame = (frame or DEFAULT_FRAME[kind]) == "same"
-    pairing = pair_spots(source_ids, first, reference_ids, second, way=matching, same_frame=same_frame, seed=seed)
+    looked_for = effects_of(effects)
+
+    def pair(points: Array) -> Pairing:
+        return pair_spots(source_ids, points, reference_ids, second, way=matching, same_frame=same_frame, seed=seed)
+
+    pairing, doubt = None, None
+    try:
+        pairing = pair(first)
+        notes = pairing.notes
+        doubtful = any(note.code == "NOT_CONGRUENT" for note in notes)
+    except RegistrationError as error:
+        if error.code != "NOT_CONGRUENT":
+            raise
+        doubt, doubtful = error, True
+    if doubtful and tool_offset.NAME in looked_for and source_rotations is not None and method == "robust":
+        moved = _congruent_by_tool(source_ids, first, source_rotations, reference_ids, second, seed)
+        if moved is not None:
+            pairing = pair(moved)
+            message = (
+                "distances between spots agree with the reference after a constant offset in the tool frame and not "
+                "before: the poses are those of another TCP (the flange, or a wrong tool)"
+            )
+            notes = (*pairing.notes, Note("CONGRUENT_BY_TOOL", message))
+    if pairing is None:
+        assert doubt is not None  # noqa: S101 - without a pairing there was an error
+        raise doubt
     match = pairing.match
-    return fit_spots(
+    fit = fit_spots(
         match.ids,
         first[match.source_rows],
         second[match.reference_rows],
         kind=kind,
         frame=frame,
         source_rotations=None if source_rotations is None else source_rotations[match.source_rows],
+        reference_rotations=None if reference_rotations is None else reference_rotations[match.reference_rows],
         noise=noise,
         seed=seed,
         method=method,
         tau=tau,
         n_min=n_min,
+        effects=effects,
         provenance=provenance,
         match=match,
-        notes=pairing.notes,
+        notes=notes,
     )
+    if doubt is not None and (fit.tool is None or not fit.tool.accepted):
+        raise doubt
+    return fit
+
+
+def _congruent_by_tool(
+    source_ids: Sequence[str],
+    source: Array,
+    rotations: Rotation,
+    reference_ids: Sequence[str],
+    reference: Array,
+    seed: int,
+) -> Array | None:
+    """Source spots (n, 3) moved by the tool offset under which the pairs by name are one body; None without any."""
+    match = match_by_name(source_ids, reference_ids)
+    first, second = source[match.source_rows], reference[match.reference_rows]
+    tools = rotations.as_matrix()
+    if len(first) < LEAST_PAIRS or not (np.isfinite(first).all() and np.isfinite(second).all()):
+        return None
+    try:
+        fit = fit_tool_robust(first, tools[match.source_rows], second, seed=seed)
+    except RegistrationError:
+        return None
+    return moved_by(source, tools, fit.offset) if congruence(fit.moved, second).same_body else None
 
 
 def fit_spots(
@@ -99,11 +159,13 @@ def fit_spots(
     kind: Kind = "theory",
     frame: Frame | None = None,
     source_rotations: Rotation | None = None,
+    reference_rotations: Rotation | None = None,
     noise: float | None = None,
     seed: int = 0,
     method: Method = "robust",
     tau: float | None = None,
     n_min: int | None = None,
+    effects: Effects = RIGID_ONLY,
     provenance: Mapping[str, Any] | None = None,
     match: IdMatch | None = None,
     notes: tuple[Note, ...] = (),
@@ -120,6 +182,8 @@ def fit_spots(
         Default "same" for theory, "free" for measured.
     source_rotations : Rotation of n, optional
         Tool orientations in the source frame.
+    reference_rotations : Rotation of n, optional
+        Tool orientations in the reference frame. They are compared, and never move the fit.
     noise : float, optional
         Standard deviation per coordinate, known independently [mm].
     seed : int
@@ -130,6 +194,9 @@ def fit_spots(
         Of the method "paper": largest residual of an inlier [mm].
     n_min : int, optional
         Of the method "paper": a subset qualifies with more inliers than this.
+    effects : "auto" or names
+        Effects to look for. One that is asked for by its name must be determined by the spots; "auto" looks for all
+        that are.
     provenance : mapping, optional
         JSON values that the calibration keeps.
     match : IdMatch, optional
@@ -141,18 +208,30 @@ def fit_spots(
     ------
     RegistrationError
         ``SHAPE_MISMATCH``, ``NOT_A_NUMBER``, ``TOO_FEW_PAIRS``, ``DUPLICATE_ID``; as `fit_paper` for the method
-        "paper"; ``COPLANAR_SPOTS`` for the method "affine".
+        "paper"; ``COPLANAR_SPOTS`` for the method "affine"; ``BAD_OPTION`` for an unknown effect; ``NO_ORIENTATION``
+        or ``TOOL_NOT_DETERMINED`` where a tool offset is asked for and cannot be tried.
     DegenerateError
         ``COLLINEAR_SPOTS``: on a line, or off it by no more than `LATERAL_NOISE` times the noise.
     """
     names = tuple(str(name) for name in ids)
     first, second = _check(names, source, reference)
     before = fit_rigid(first, second, checked=False)
-    exchanged = find_exchanged(names, first, second, seed=seed)
-    robust, repaired = exchanged.robust, second[exchanged.permutation]
-    inliers = robust.inliers
-    calibrated = robust.rigid.predict(first)
-    uncertainty = transform_uncertainty(calibrated[inliers], robust.rigid.residuals[inliers])
+    exchanged, trial = search_effects(
+        names, first, second, source_rotations, effects, kind=kind, noise=noise, seed=seed
+    )
+    tool = trial.fit if trial is not None and trial.accepted else None
+    repaired = second[exchanged.permutation]
+    if tool is None:
+        robust, moved = exchanged.robust, first
+        inliers = robust.inliers
+        calibrated = robust.rigid.predict(first)
+        uncertainty = transform_uncertainty(calibrated[inliers], robust.rigid.residuals[inliers])
+        after_loo = leave_one_out(first, repaired, inliers)
+    else:
+        assert trial is not None  # noqa: S101 - it has the fit
+        robust, moved = robust_of(tool, repaired), tool.moved
+        inliers, uncertainty = robust.inliers, uncertainty_of(tool)
+        after_loo = tool.residuals if trial.left_out is None else trial.left_out
     _require_breadth(robust.rigid, uncertainty.sigma)
     reference_names = names if match is None or not match.reference_ids else match.reference_ids
     model = Calibration(
@@ -162,7 +241,9 @@ def fit_spots(
         frame=frame or DEFAULT_FRAME[kind],
         ids=names,
         provenance=dict(provenance or {}),
+        tool_offset=None if tool is None else tool.offset,
     )
+    found = swapped_ids.effects_of(exchanged, names, second, kind=kind)
     fit = SpotFit(
         model=model,
         match=match,
@@ -174,21 +255,32 @@ def fit_spots(
         as_found=first - second,
         before=before,
         before_loo=leave_one_out(first, second),
-        after_loo=leave_one_out(first, repaired, inliers),
+        after_loo=after_loo,
         exchanged=exchanged,
         robust=robust,
         affine=fit_affine(first, second),
-        translation=fit_translation(first[inliers], repaired[inliers]),
+        translation=fit_translation(moved[inliers], repaired[inliers]),
         directions=residual_directions(robust.rigid.residuals[inliers]),
-        support=rotation_support(first[inliers], repaired[inliers]),
+        support=rotation_support(moved[inliers], repaired[inliers]),
         uncertainty=uncertainty,
-        effects=swapped_ids.effects_of(exchanged, names, second, kind=kind),
+        effects=found if trial is None or trial.effect is None else (*found, trial.effect),
         noise=noise,
-        notes=notes,
+        notes=notes if tool is None else tuple(note for note in notes if note.code != "NOT_CONGRUENT"),
+        tool=trial,
+        orientations=_orientations(robust, source_rotations, reference_rotations, exchanged),
     )
     if method == "paper":
         return paper_fit(fit, tau=tau, n_min=n_min, seed=seed)
     return affine_fit(fit) if method == "affine" else fit
+
+
+def _orientations(
+    robust: RobustFit, source: Rotation | None, reference: Rotation | None, exchanged: ExchangeResult
+) -> OrientationFit | None:
+    if source is None or reference is None:
+        return None
+    rows = np.flatnonzero(robust.inliers)
+    return compare_orientations(robust.rigid.rotation, source[rows], reference[exchanged.permutation[rows]])
 
 
 def _check(names: tuple[str, ...], source: ArrayLike, reference: ArrayLike) -> tuple[Array, Array]:

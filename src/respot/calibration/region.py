@@ -42,13 +42,17 @@ def outside(spots: Array, points: Array, margin: float = 0.0) -> NDArray[np.bool
     beyond: NDArray[np.bool_] = np.zeros(len(points), dtype=bool)
     for axis in np.flatnonzero(~wide):
         beyond |= (others[:, axis] > own[:, axis].max() + reach) | (others[:, axis] < own[:, axis].min() - reach)
-    own, others = own[:, wide], others[:, wide]
-    if own.shape[1] == 1:
-        return beyond | (others[:, 0] > own.max() + reach) | (others[:, 0] < own.min() - reach)
+    return np.asarray(beyond | _beyond_hull(own[:, wide], others[:, wide], reach))
+
+
+def _beyond_hull(own: Array, others: Array, reach: float) -> NDArray[np.bool_]:
     if own.shape[1] == 0:
-        return beyond
+        return np.zeros(len(others), dtype=bool)
+    box = ((others > own.max(axis=0) + reach) | (others < own.min(axis=0) - reach)).any(axis=1)
+    if own.shape[1] == 1:
+        return np.asarray(box)
     try:
         faces = ConvexHull(own).equations
-    except QhullError:  # pragma: no cover - a hull that rounding makes flat: its box is said instead
-        return beyond | ((others > own.max(axis=0) + reach) | (others < own.min(axis=0) - reach)).any(axis=1)
-    return beyond | (others @ faces[:, :-1].T + faces[:, -1] > reach).any(axis=1)
+    except QhullError:  # pragma: no cover - a hull that rounding makes flat: its box is the least that is known
+        return np.asarray(box)
+    return np.asarray((others @ faces[:, :-1].T + faces[:, -1] > reach).any(axis=1))

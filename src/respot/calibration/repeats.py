@@ -58,8 +58,8 @@ class Repeats:
 def noise_from_repeats(ids: Sequence[str], positions: ArrayLike) -> Repeats:
     """Average spots that were measured more than once, and estimate the noise from what they differ by.
 
-    The noise is the pooled standard deviation within spots: what a spot's own place has in it does not count. It is that
-    of the measuring; how far a spot strays from the model is seen in the residuals only.
+    The noise is the pooled standard deviation within spots: what a spot's own place has in it does not count. It is
+    that of the measuring; how far a spot strays from the model is seen in the residuals only.
 
     Parameters
     ----------
@@ -93,6 +93,4 @@ def noise_from_repeats(ids: Sequence[str], positions: ArrayLike) -> Repeats:
     if over <= 0:
         return Repeats(tuple(first.values()), means, counts, None, 0, None)
     squares = np.sum((points - means[rows]) ** 2, axis=0) / over
-    return Repeats(
-        tuple(first.values()), means, counts, float(np.sqrt(squares.mean())), 3 * over, np.sqrt(squares)
-    )
+    return Repeats(tuple(first.values()), means, counts, float(np.sqrt(squares.mean())), 3 * over, np.sqrt(squares))

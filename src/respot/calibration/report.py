@@ -79,6 +79,8 @@ def _report(fit: SpotFit) -> dict[str, Any]:
         ],
         "residual_sd_xyz": fit.directions.sd_xyz.tolist(),
         "effects": [effect.to_dict() for effect in fit.effects],
+        "effects_tried": [] if fit.tool is None else [fit.tool.to_dict()],
+        "orientations": None if fit.orientations is None else fit.orientations.to_dict(),
         "as_found": distances(fit.as_found).to_dict(),
         "before": distances(fit.before.residuals).to_dict(),
         "after": distances(rigid.residuals[inliers]).to_dict(),
@@ -133,6 +135,8 @@ def _affine_figures(fit: SpotFit, affine: AffineFit, rigid: dict[str, Any]) -> d
     return {
         "transform": None,
         "effects": [],
+        "effects_tried": [],
+        "orientations": None,
         "n_inliers": len(fit.ids),
         "after": after,
         "after_all": after,
@@ -193,16 +197,18 @@ def _transform(fit: SpotFit) -> dict[str, Any]:
         "rotation": rotation.tolist(),
         "translation": fit.model.translation.tolist(),
         "abc": abc_from_rotation(Rotation.from_matrix(rotation)).tolist(),
-        "covariance": sure.covariance.tolist(),
+        "tool_offset": None if fit.model.tool_offset is None else fit.model.tool_offset.tolist(),
+        "covariance": sure.covariance[:6, :6].tolist(),
+        "covariance_with_tool": None if fit.model.tool_offset is None else sure.covariance.tolist(),
         "centroid": sure.centroid.tolist(),
         "sigma": sure.sigma,
-        "ci95": {name: float(half) for name, half in zip(PARAMETERS, sure.half_width, strict=True)},
+        "ci95": {name: float(half) for name, half in zip(PARAMETERS, sure.half_width[:6], strict=True)},
     }
 
 
 def _spots(fit: SpotFit) -> list[dict[str, Any]]:
-    points, turned = fit.model.predict(fit.source, fit.source_rotations)
-    angles = None if turned is None else abc_from_rotation(turned)
+    points, tools = fit.calibrated, fit.source_rotations
+    angles = None if tools is None else abc_from_rotation(Rotation.from_matrix(fit.model.rotation) * tools)
     residuals = fit.robust.rigid.residuals
     as_found, before, after = (np.linalg.norm(v, axis=1) for v in (fit.as_found, fit.before.residuals, residuals))
     rows = []

@@ -10,6 +10,9 @@ import numpy as np
 
 from respot import __version__
 from respot.calibration.calibration import Frame, Kind
+from respot.calibration.effects import tool_offset
+from respot.calibration.effects.search import RIGID_ONLY, Effects
+from respot.calibration.effects.tool_fit import moved_by
 from respot.calibration.fit import fit_tables
 from respot.calibration.spot_fit import Method, SpotFit
 from respot.issues import BadInputError, Issue
@@ -49,6 +52,8 @@ class FitOptions:
         ``"auto"``, ``"id"`` or ``"geometry"``: how spots are paired.
     profiles : sequence of Path
         A plant's instruction forms.
+    effects : "auto" or names
+        Effects to look for.
     """
 
     kind: Kind = "theory"
@@ -62,6 +67,7 @@ class FitOptions:
     n_min: int | None = None
     match: Matching = "auto"
     profiles: Sequence[Path] = ()
+    effects: Effects = RIGID_ONLY
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,12 +113,14 @@ def fit_source(source_path: Path, reference_path: Path, options: FitOptions) -> 
             kind=options.kind,
             frame=options.frame,
             source_rotations=source.spots.rotations,
+            reference_rotations=reference.spots.rotations,
             noise=options.noise,
             seed=options.seed,
             method=options.method,
             tau=options.tau,
             n_min=options.n_min,
             matching=options.match,
+            effects=options.effects,
             provenance={
                 "version": __version__,
                 "source": str(source_path),
@@ -147,6 +155,7 @@ def _fit_issues(fit: SpotFit, source: Source, reference: Source) -> list[Issue]:
         if effect.name == "swapped_ids":
             names = ", ".join(str(name) for name in effect.where["ids"])
             issues.append(Issue("EXCHANGED_NAMES", f"{names} carry each other's names in one of the two lists"))
+    issues += _tool_issues(fit.beside or fit, source)
     if fit.method == "affine":
         issues.append(
             Issue("NOT_RIGID", "12 free parameters are for comparison only: no calibration, nothing to convert by")
@@ -160,6 +169,17 @@ def _fit_issues(fit: SpotFit, source: Source, reference: Source) -> list[Issue]:
     return issues
 
 
+def _tool_issues(fit: SpotFit, source: Source) -> list[Issue]:
+    """A tool offset in the model, one that could not be tried, and what orientations say."""
+    found = [effect for effect in fit.effects if effect.name == tool_offset.NAME]
+    issues = [Issue("TOOL_OFFSET", effect.remedy.text, str(source.path)) for effect in found]
+    if fit.tool is not None and fit.tool.code == "TOOL_NOT_DETERMINED":
+        issues.append(Issue("TOOL_NOT_TRIED", fit.tool.verdict, str(source.path)))
+    if fit.orientations is not None and fit.orientations.code is not None:
+        issues.append(Issue(fit.orientations.code, fit.orientations.verdict, str(source.path)))
+    return issues
+
+
 def _renamed(fit: SpotFit, source: Source, reference: Source) -> list[Issue]:
     """Spots without a partner that lie where the other list has one without a partner: probably renamed."""
     assert fit.match is not None  # noqa: S101 - only called where two lists were paired
@@ -168,7 +188,10 @@ def _renamed(fit: SpotFit, source: Source, reference: Source) -> list[Issue]:
     if not own or not other:
         return []
     model = fit.beside or fit
-    images = model.robust.rigid.predict(source.spots.positions[own])
+    points = source.spots.positions[own]
+    if model.model.tool_offset is not None and source.spots.rotations is not None:
+        points = moved_by(points, source.spots.rotations[own].as_matrix(), model.model.tool_offset)
+    images = model.robust.rigid.predict(points)
     apart = np.linalg.norm(images[:, None, :] - reference.spots.positions[other][None, :, :], axis=-1)
     near = apart <= model.robust.threshold
     pairs = [

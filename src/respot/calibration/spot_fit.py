@@ -11,6 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from respot.calibration.calibration import Calibration, CalibrationError
 from respot.calibration.effects.effect import Effect
+from respot.calibration.effects.orientations import OrientationFit
+from respot.calibration.effects.tool_offset import ToolTrial
 from respot.calibration.uncertainty import TransformUncertainty
 from respot.registration.affine import AffineFit
 from respot.registration.alternatives import TranslationFit
@@ -73,6 +75,11 @@ class SpotFit:
         Our robust fit of the same pairs, of any other method.
     notes : tuple of Note
         What was noticed while pairing.
+    tool : ToolTrial or None
+        What became of the effect ``tool_offset``, where it was tried. Accepted, it is part of the model: ``robust`` is
+        then the fit of `moved`, and ``uncertainty.covariance`` (9, 9) has the offset's three parameters last.
+    orientations : OrientationFit or None
+        How tool orientations compare, where source and reference have them.
     """
 
     model: Calibration
@@ -100,6 +107,8 @@ class SpotFit:
     paper_mean_square: PaperFit | None = None
     beside: SpotFit | None = None
     notes: tuple[Note, ...] = ()
+    tool: ToolTrial | None = None
+    orientations: OrientationFit | None = None
 
     @property
     def calibration(self) -> Calibration:
@@ -132,9 +141,16 @@ class SpotFit:
         return tuple(names[row] for row in range(len(self.ids)))
 
     @property
+    def moved(self) -> Array:
+        """Source spots (n, 3) with the tool offset of the model, source frame [mm]: what the rigid part turns."""
+        if self.tool is None or self.tool.fit is None or not self.tool.accepted:
+            return self.source
+        return self.tool.fit.moved
+
+    @property
     def calibrated(self) -> Array:
         """Source spots under the final model (n, 3), reference frame [mm]."""
-        return self.robust.rigid.predict(self.source)
+        return self.robust.rigid.predict(self.moved)
 
     @property
     def repaired(self) -> NDArray[np.bool_]:

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from respot import __version__
-from respot.cli import check, convert, demo, fit, inspect, robots
+from respot.cli import check, convert, demo, fit, inspect, predict, robots, validate
 
 app = typer.Typer(
     name="respot",
@@ -19,7 +19,16 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-_COMMANDS = {"demo": demo, "inspect": inspect, "fit": fit, "convert": convert, "check": check, "robots": robots}
+_COMMANDS = {
+    "demo": demo,
+    "inspect": inspect,
+    "fit": fit,
+    "predict": predict,
+    "validate": validate,
+    "convert": convert,
+    "check": check,
+    "robots": robots,
+}
 for name, command in _COMMANDS.items():
     app.command(name, help=command.HELP)(command.run)
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from respot.cli import options
-from respot.cli.fit import reference_of
+from respot.cli.fit import effects_named, reference_of
 from respot.cli.outcome import Outcome
 from respot.cli.outcome import run as run_command
 from respot.issues import BadInputError
@@ -35,6 +35,7 @@ def run(
     tau: options.Tau = None,
     n_min: options.NMin = None,
     match: options.Match = "auto",
+    effects: options.EffectsOption = "swapped_ids",
     frame: options.FrameOption = None,
     robot_name: options.RobotName = None,
     robot: options.RobotModel = None,
@@ -73,14 +74,22 @@ def run(
                 "may be corrected by them; use --method robust, or fit --method affine to look at them"
             )
             raise BadInputError("BAD_OPTION", message)
+        looked_for = effects_named(effects)
+        if "tool_offset" in looked_for or looked_for == "auto":
+            message = (
+                "programs are not corrected by a tool offset: it would have to go into the tool as well, or the tool "
+                "be corrected twice; look for it with fit, correct the TCP, and convert with --effects swapped_ids"
+            )
+            raise BadInputError("BAD_OPTION", message)
         model = None if robot is None else robot_of(robot)
         chosen = CorrectionOptions(programs, shift_limits(max_shift), keep_config, partial, templates, model)
         if calibration is not None:
             if theory or measured:
                 raise BadInputError("BAD_OPTION", "give either -c CAL.json or a reference to fit to, not both")
-            if (method, tau, n_min, match) != ("robust", None, None, "auto"):
+            if (method, tau, n_min, match, effects) != ("robust", None, None, "auto", "swapped_ids"):
                 message = (
-                    "--method, --tau, --n-min and --match belong to a fit; the calibration of -c is fitted already"
+                    "--method, --tau, --n-min, --match and --effects belong to a fit; the calibration of -c is fitted "
+                    "already"
                 )
                 raise BadInputError("BAD_OPTION", message)
             from respot.calibration.source_fit import FitOptions
@@ -90,7 +99,7 @@ def run(
             reference, fit_options = reference_of(
                 theory, measured, frame, robot_name, spot_id, noise, seed, method, tau, n_min, match
             )
-        fit_options = replace(fit_options, profiles=tuple(profile or ()))
+        fit_options = replace(fit_options, profiles=tuple(profile or ()), effects=looked_for)
         return convert_to(source, reference, calibration, fit_options, chosen, output, dry_run, force, tolerance)
 
     run_command(work, as_json, strict)

@@ -15,6 +15,7 @@ from respot.issues import BadInputError
 
 if TYPE_CHECKING:
     from respot.calibration.calibration import Kind
+    from respot.calibration.effects.search import Effects
     from respot.calibration.source_fit import FitOptions
     from respot.calibration.spot_fit import Method
     from respot.registration.matching import Matching
@@ -33,6 +34,7 @@ def run(
     tau: options.Tau = None,
     n_min: options.NMin = None,
     match: options.Match = "auto",
+    effects: options.EffectsOption = "auto",
     frame: options.FrameOption = None,
     robot_name: options.RobotName = None,
     spot_id: options.SpotId = None,
@@ -47,6 +49,7 @@ def run(
     """Run the command."""
 
     def work() -> Outcome:
+        from respot.calibration.precision import with_precision
         from respot.calibration.report import report
         from respot.calibration.source_fit import fit_source
         from respot.cli.show_fit import show_fit
@@ -54,6 +57,7 @@ def run(
         reference, chosen = reference_of(
             theory, measured, frame, robot_name, spot_id, noise, seed, method, tau, n_min, match
         )
+        looked_for = effects_named(effects)
         if output is not None and method == "affine":
             message = "--method affine is for comparison only and makes no calibration to save: leave -o out"
             raise BadInputError("BAD_OPTION", message)
@@ -64,10 +68,10 @@ def run(
         if output is not None and any(holds(path, output) for path in (source, reference)):
             message = "lies in the source or the reference; name another file with -o"
             raise BadInputError("OUTPUT_EXISTS", message, str(output))
-        fitted = fit_source(source, reference, replace(chosen, profiles=tuple(profile or ())))
+        fitted = fit_source(source, reference, replace(chosen, profiles=tuple(profile or ()), effects=looked_for))
         if output is not None:
             try:
-                fitted.fit.calibration.save(output)
+                with_precision(fitted.fit).save(output)
             except OSError as error:
                 raise BadInputError("CANNOT_READ", f"cannot be written: {error.strerror}", str(output)) from error
         content_hash = None if method == "affine" else fitted.fit.calibration.content_hash
@@ -75,6 +79,26 @@ def run(
         return Outcome("fit", data, lambda: show_fit(fitted, tolerance, output), list(fitted.issues))
 
     run_command(work, as_json, strict)
+
+
+def effects_named(text: str) -> Effects:
+    """Read ``auto``, ``none`` or names with commas.
+
+    Raises
+    ------
+    BadInputError
+        ``BAD_OPTION`` for a name that no effect has.
+    """
+    from respot.calibration.effects.search import effects_of
+    from respot.registration.errors import RegistrationError
+
+    if text == "auto":
+        return "auto"
+    names = () if text == "none" else tuple(dict.fromkeys(name.strip() for name in text.split(",")))
+    try:
+        return effects_of(names)
+    except RegistrationError as error:
+        raise BadInputError("BAD_OPTION", f"--effects is auto, none or names with commas: {error}") from error
 
 
 def holds(source: Path, output: Path) -> bool:

@@ -30,7 +30,7 @@ def run(
         from respot.backups import open_backup
         from respot.cli.show_inspect import show_robots, show_table
         from respot.inspection import form_issues, inspect_robot, inspect_table
-        from respot.languages.forms import read_profile
+        from respot.languages.profile_file import read_profile
         from respot.spots import is_backup, spots_of_robot
         from respot.tables import read_table
 

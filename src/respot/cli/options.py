@@ -80,6 +80,13 @@ NMin = Annotated[
 Match = Annotated[
     str, typer.Option("--match", help="How spots are paired: auto, id (by name) or geometry (names play no part).")
 ]
+EffectsOption = Annotated[
+    str,
+    typer.Option(
+        "--effects",
+        help="What to look for beside the rigid part: auto, none, or names with commas (swapped_ids, tool_offset).",
+    ),
+]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything that is drawn.")]
 Tolerance = Annotated[float, typer.Option("--tolerance", min=0.0, help="Tolerance of a spot, mm.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]

@@ -9,6 +9,7 @@ import numpy as np
 
 from respot.cli.display import Column, heading, line, table, terminal_width
 from respot.cli.show_method import show_affine, show_paper
+from respot.cli.show_tool import show_tool
 from respot.languages import LANGUAGES
 from respot.registration.matching import PLACE
 
@@ -36,6 +37,7 @@ def show_fit(fitted: SourceFit, tolerance: float, saved: Path | None = None) -> 
     _show_spots(fit)
     _show_errors(fit, tolerance)
     _show_transform(fit)
+    show_tool(fit)
     if fit.method == "paper":
         show_paper(fit)
     _show_found(fit)
@@ -88,6 +90,8 @@ def _show_errors(fit: SpotFit, tolerance: float) -> None:
     rigid, inliers = fit.robust.rigid.residuals, fit.robust.inliers
     kept = "names exchanged back" if fit.repaired.any() else "names as given"
     after = "the paper's transform" if fit.method == "paper" else "rigid"
+    if fit.model.tool_offset is not None:
+        after = "rigid with a tool offset"
     rows = [
         _errors("as found, no transform", fit.as_found),
         _errors("before: rigid, all spots, names as given", fit.before.residuals),
@@ -125,7 +129,7 @@ def _show_transform(fit: SpotFit) -> None:
     inliers = fit.robust.inliers
     moved = (fit.calibrated[inliers] - fit.source[inliers]).mean(axis=0)
     turned = np.degrees(fit.model.source2reference.rotation.as_rotvec())
-    half = fit.uncertainty.half_width
+    half = fit.uncertainty.half_width[:6]
     for name, value, width in zip("xyz", moved, half[:3], strict=True):
         line(f"  the spots' centre moves in {name} by {value:8.3f} +- {width:.3f} mm")
     for name, value, width in zip("xyz", turned, half[3:], strict=True):
@@ -138,9 +142,15 @@ def _show_found(fit: SpotFit) -> None:
     effects = (fit.beside or fit).effects
     for effect in effects:
         word = "named" if effect.named else "consistent with"
-        line(f"  {effect.name} ({word}): {effect.remedy.text}")
+        rivals = f"; not separated from {', '.join(effect.not_separated_from)}" if effect.not_separated_from else ""
+        line(f"  {effect.name} ({word}{rivals}): {effect.remedy.text}")
     if not effects:
         line("  no effect found beyond the rigid transform")
+    trial = (fit.beside or fit).tool
+    if trial is not None and not trial.accepted and trial.figures is not None:
+        line(f"  tool_offset was tried and is not part of the model: {trial.verdict}")
+    if fit.orientations is not None:
+        line(f"  {fit.orientations.verdict}")
     sd = fit.directions.sd_xyz
     axis = fit.directions.axes[int(np.argmax(fit.directions.sd))]
     along = "xyz"[int(np.argmax(np.abs(axis)))]

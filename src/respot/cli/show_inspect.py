@@ -65,11 +65,13 @@ def _holds(count: Mapping[str, Any]) -> bool:
 
 
 def _counted(count: Mapping[str, Any]) -> str:
-    parts = [_plural(count["spots"], "spot"), f"{_plural(count['targets'], 'motion')} to points"]
+    parts = [_plural(count["spots"], "spot")] if count["spots"] else []
+    if count["targets"]:
+        parts.append(f"{_plural(count['targets'], 'motion')} to points")
     if count["joints"]:
         parts.append(f"{_plural(count['joints'], 'motion')} to joints")
     if count["unresolved"]:
-        parts.append(f"{_plural(count['unresolved'], 'motion')} to a place that is not known")
+        parts.append(f"{_plural(count['unresolved'], 'motion')} whose goal the program computes or does not tell")
     frames = [f"{kind} {', '.join(count[kind])}" for kind in ("tools", "bases") if count[kind]]
     return "; ".join([*parts, *frames])
 
@@ -85,6 +87,8 @@ def _show_program(program: str, targets: Sequence[Mapping[str, Any]]) -> None:
     shown = targets[:_MOST_ROWS]
     columns = [Column(name, name not in _TEXT) for name in _COLUMNS]
     table(columns, [_row(target) for target in shown], [target["doubt"] is not None for target in shown])
+    if any(target["doubt"] is not None for target in shown):
+        line("(?) stands for: where the motion goes is not sure; --json says why for each")
     if len(targets) > len(shown):
         line(f"... and {len(targets) - len(shown)} more; --json has them all")
 
@@ -101,6 +105,8 @@ def _frame_row(frame: Mapping[str, Any]) -> list[str]:
 
 def _row(target: Mapping[str, Any]) -> list[str]:
     pose = ["" if value is None else f"{value:.3f}" for value in _pose(target)]
-    motion = f"{target['kind']}, weld" if target["weld"] else target["kind"]
+    marks = [text for text, holds in (("weld", target["weld"]), ("external TCP", target["external_tcp"])) if holds]
+    motion = ", ".join([target["kind"], *marks, *(["shifted"] if target["offset"] else [])])
     known = [target["tool"] or "?", target["base"] or "?"]
-    return [target["routine"], str(target["line"]), motion, target["name"], target["spot_id"] or "", *known, *pose]
+    name = f"{target['name']} (?)" if target["doubt"] is not None else target["name"]
+    return [target["routine"], str(target["line"]), motion, name, target["spot_id"] or "", *known, *pose]

@@ -136,6 +136,13 @@ def convert(
         issues, ids = read.issues, model.ids
     if read.robot is None:
         raise BadInputError("NO_ROBOT", "is a table: only a backup or a program can be converted", str(source))
+    if model.tool_offset is not None:
+        message = (
+            "the calibration has a tool offset: moving points by its rigid part alone would leave every spot off by "
+            "the offset, and whether the tool or the points are to be corrected is for you to say: correct the TCP, "
+            "fit again and convert, or fit with --effects swapped_ids"
+        )
+        raise BadInputError("BAD_OPTION", message, str(calibration or reference))
     if model.kind != "theory":
         message = (
             "a measured reference without effects registers two coordinate systems and has nothing to compensate; "

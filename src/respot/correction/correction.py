@@ -154,9 +154,7 @@ def align(
         edits=edits,
         refused=refused,
         refused_programs=refused_programs,
-        transitions=_transitions(
-            robot, scope, {id(i.target) for i in moving if not kept(i.programs, i.target.name)}, refused_programs
-        ),
+        transitions=_transitions(robot, scope, {id(i.target) for i in moving if not kept.holds(i)}, refused_programs),
         files=_changed_files(robot, language, options, edits, header),
         reconfigured=all(id(item) in configured for item in moving if language.has_configuration(item.target)),
         issues=[*_issues(robot, cell, scope, moving, spot_moves, edits), *checked.issues],
@@ -174,15 +172,20 @@ class _Kept:
     """Tells what a refusal keeps as it was."""
 
     def __init__(self, refused: Iterable[Refusal], programs: frozenset[str], partial: bool) -> None:
-        self._targets = {(refusal.program, refusal.target) for refusal in refused}
+        self._targets = {(refusal.program, refusal.target.lower()) for refusal in refused}
         self._programs = programs
         self._partial = partial
 
     def __call__(self, programs: Collection[str], target: str) -> bool:
         if self._partial:
             relative = target == str(None) and any(program in programs for program, _ in self._targets)
-            return relative or any((program, target) in self._targets for program in programs)
+            return relative or any((program, target.lower()) in self._targets for program in programs)
         return any(program in self._programs for program in programs)
+
+    def holds(self, item: Moving) -> bool:
+        """Whether a target stays as it was; the original of a touched-up target stays with it."""
+        names = [name for name in (item.target.name, item.target.original_of) if name]
+        return any(self(item.programs, name) for name in names)
 
 
 def _refuse_twice(robot: Robot, calibration_hash: str) -> None:
@@ -261,7 +264,7 @@ def _preflight(
     while True:
         programs = _refused_programs(scope, refused) if not options.partial else frozenset[str]()
         kept = _Kept(refused, programs, options.partial)
-        checked = flight.check({id(item.target) for item in moving if not kept(item.programs, item.target.name)})
+        checked = flight.check({id(item.target) for item in moving if not kept.holds(item)})
         known = {(refusal.program, refusal.target, refusal.code) for refusal in refused}
         found = [
             replace(refusal, message=f"{refusal.message}{_hint(refusal.code)}")
@@ -299,10 +302,12 @@ def _edits(
     made = templates(language.name, options.templates)
     edits: list[PointEdit | None] = []
     for item in moving:
-        if not kept(item.programs, item.target.name):
+        if not kept.holds(item):
             text = robot.files[item.target.path].source.text
             edits.append(point_edit(item, after[id(item)], configured.get(id(item), {}), text, language, made))
-    for move in scope.offsets:
+    # one offset that a call hands to a routine with several motions is one literal
+    offsets = {(move.offset.path, move.offset.span): move for move in scope.offsets if move.offset is not None}
+    for move in offsets.values():
         if not kept((move.program,), str(move.target)) and move.offset is not None and move.base2spots is not None:
             values = new_offset(move.offset, move.base2spots, source2reference)
             edits.append(offset_edit(move, values, robot.files[move.offset.path].source.text, made))

@@ -10,6 +10,8 @@ belongs to the part. Every other routine that goes to a moved target comes into 
 from __future__ import annotations
 
 import fnmatch
+import re
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -18,9 +20,13 @@ from scipy.spatial.transform import RigidTransform
 from respot.geometry import distance_mm, turn_deg
 from respot.program.frames import Frame
 from respot.program.moves import Move
-from respot.program.robot import Robot, Routine
+from respot.program.robot import Robot, Routine, Unread
 from respot.program.targets import Target, TargetKind
 from respot.tolerance import SAME_POSITION_MM, SAME_ROTATION_DEG
+
+#: A literal position within a statement that no rule knows: ``[[1,2,3],..``, ``{X 1,..``, ``{E6POS: X 1,..``.
+_POSE = re.compile(r"\[\s*\[|\{\s*(?:\w+\s*:)?\s*[XYZ]\s", re.IGNORECASE)
+_NAME = re.compile(r"[^\W\d][\w$]*(?:\[[\d,]+\])?(?:\.\w+)*")
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +112,7 @@ class _Finder:
         held = {id(move) for move in spots}
         self._task_of = {id(move): routine.task for routine in robot.routines for move in routine.moves}
         self._parts = [_Part(self._task_of[id(move)], move) for move in spots if move.workpiece is not None]
+        self._several_parts = _held_frames(self._parts)
         self._welding = {id(r) for r in robot.routines if any(id(move) in held for move in r.moves)}
         self._core, self._wide = _routines(robot, self._welding, programs)
         self._everywhere: dict[int, list[Move]] = {}
@@ -113,6 +120,8 @@ class _Finder:
             if move.target is not None:
                 self._everywhere.setdefault(id(move.target), []).append(move)
         self._found: dict[tuple[str, int, bool], bool] = {}
+        self._points = {t.name.lower() for t in robot.targets if t.kind is not TargetKind.JOINTS}
+        self._frame_names = _frame_names(self._everywhere.values())
 
     def find(self) -> Scope:
         """Return the decision."""
@@ -134,7 +143,9 @@ class _Finder:
         scope = Scope(routines=[r for r in self._robot.routines if id(r) in self._core | self._wide])
         uses: dict[int, list[Move]] = {}
         for routine in scope.routines:
-            for unread in routine.unread if id(routine) in self._core else ():
+            for unread in routine.unread:
+                if id(routine) not in self._core and not self._may_move(unread):
+                    continue
                 message = f"nobody knows what {unread.text.strip()!r} does: {unread.reason}"
                 name = f"line {unread.line}"
                 refusal = Refusal(routine.program, name, "OPAQUE_STATEMENT", message, routine.path, unread.line)
@@ -149,6 +160,11 @@ class _Finder:
                     if move.offset is not None:
                         scope.offsets.append(move)
         return scope, uses
+
+    def _may_move(self, unread: Unread) -> bool:
+        """Whether a statement that no rule knows names a position: it may go there."""
+        names = {name.lower() for name in _NAME.findall(unread.text)}
+        return bool(names & self._points) or bool(_POSE.search(unread.text))
 
     def _is_service(self, routine: Routine) -> bool:
         return id(routine) not in self._welding and routine.service
@@ -202,6 +218,12 @@ class _Finder:
                 "respot cannot tell whether it belongs to the part"
             )
             return refuse("WORLD_BASE", message)
+        if move.external_tcp and self._several_parts and self._is_matched(move, routine.task):
+            message = (
+                f"spots are matched in several frames of the held part, {' and '.join(self._several_parts)}: "
+                "the calibration can be that of one only; correct the spots of one frame at a time"
+            )
+            return refuse("EXTERNAL_TCP", message)
         if self._is_mixed(move, routine.task):
             message = (
                 "the matched spots use the same frames, but one of them with the gun and the other with the part on "
@@ -242,13 +264,34 @@ class _Finder:
             refusal = Refusal(first.program, target.name, "SHARED_TARGET", message, first.path, first.line)
             scope.refusals.append(refusal)
             return
+        if self._is_frame(target):
+            message = "it is also a base or tool: what is programmed in it would move with it, and once more by itself"
+            scope.refusals.append(Refusal(first.program, target.name, "SHARED_TARGET", message, first.path, first.line))
+            return
         assert first.base2spots is not None  # noqa: S101 - refused above
         scope.moving.append(Moving(target, first.base2spots, everywhere))
+
+    def _is_frame(self, target: Target) -> bool:
+        """Whether code takes a target for a base or tool, or makes one of it."""
+        return bool({target.path, ""} & self._frame_names.get(target.name.lower(), set()))
+
+
+def _frame_names(moves: Iterable[Sequence[Move]]) -> dict[str, set[str]]:
+    """Names in the expressions of all bases and tools, in lower case, with the file that declares each, if known."""
+    found: dict[str, set[str]] = {}
+    frames = {id(frame): frame for group in moves for move in group for frame in (move.base, move.tool) if frame}
+    for frame in frames.values():
+        for name in _NAME.findall(frame.name):
+            found.setdefault(name.lower(), set()).add(frame.path or "")
+    return found
 
 
 def _take_originals(scope: Scope) -> None:
     """Move the original of a touched-up target with it: a controller that limits touch-ups compares the two."""
+    targets = [*(item.target for item in scope.moving), *(stay.target for stay in scope.stays)]
+    named = Counter((target.path, target.name.lower()) for target in targets)
     moving = {(item.target.path, item.target.name.lower()): item for item in scope.moving}
+    moving = {key: item for key, item in moving.items() if named[key] == 1}  # another is declared in a routine
     for stay in [stay for stay in scope.stays if stay.target.original_of]:
         twin = moving.get((stay.target.path, stay.target.original_of.lower()))
         if twin is not None and stay.code == "NOT_REACHED" and stay.target.pose is not None:
@@ -266,6 +309,16 @@ class _Part:
     def carries(self, task: str, frame: Frame, external_tcp: bool) -> bool:
         own = self.move.workpiece
         return self.task == task and external_tcp == self.move.external_tcp and own is not None and _same(frame, own)
+
+
+def _held_frames(parts: Iterable[_Part]) -> list[str]:
+    """Names of the frames of held parts in which spots are matched; empty for one."""
+    frames: list[Frame] = []
+    for part in parts:
+        own = part.move.workpiece
+        if part.move.external_tcp and own is not None and not any(_same(own, frame) for frame in frames):
+            frames.append(own)
+    return [str(frame) for frame in frames] if len(frames) > 1 else []
 
 
 def _shared(first: Frame | None, second: Frame | None) -> bool:

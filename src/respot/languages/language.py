@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 from scipy.spatial.transform import RigidTransform
 
 from respot.issues import Issue
-from respot.languages.forms import Forms, Profile
+from respot.languages.forms import Forms
+from respot.languages.profile import Profile
 from respot.program.robot import ProgramFile, Robot
 from respot.program.statement import Statement
 from respot.program.targets import Target

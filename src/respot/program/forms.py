@@ -251,7 +251,10 @@ class Form:
             if copy.value is not None:
                 firsts.setdefault(copy.value.upper(), copy)
         if len(firsts) > 1:
-            said = ", ".join(f"{_shown(copy)} in {copy.place}" for copy in firsts.values())
+            texts = [_shown(copy) for copy in firsts.values()]
+            if len(set(texts)) < len(texts):  # they differ in how much of the text is the name: say what is compared
+                texts = [f"{copy.value} ({text})" for copy, text in zip(firsts.values(), texts, strict=True)]
+            said = ", ".join(f"{text} in {copy.place}" for text, copy in zip(texts, firsts.values(), strict=True))
             message = f"{name}: {said}; the robot obeys the code and its data"
             yield Issue("FORM_DISAGREES", message, self.path, self.line)
 

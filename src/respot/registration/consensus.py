@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from respot.registration.rigid import transform_of
+from respot.registration.row_order import own_order
 
 Array = NDArray[np.float64]
 
@@ -35,11 +36,13 @@ def consensus_transform(source: Array, reference: Array, *, seed: int, trials: i
     ----------
     source, reference : (n, 3) arrays, n >= 4 [mm]
     """
-    order = np.lexsort(np.hstack([source, reference]).T)
+    order = own_order(source, reference)
     rng = np.random.default_rng(seed)
     if len(order) > _SCORED_ROWS:
         order = rng.choice(order, _SCORED_ROWS, replace=False)
-    source, reference = source[order], reference[order]
+    origins = np.median(source[order], axis=0), np.median(reference[order], axis=0)
+    source, reference = source[order] - origins[0], reference[order] - origins[1]
+    squares_of = _Squares(source, reference).of
     n = len(source)
     quota = quota_of(n)
     if comb(n, 3) <= trials:
@@ -47,15 +50,16 @@ def consensus_transform(source: Array, reference: Array, *, seed: int, trials: i
     else:
         triples = np.argsort(rng.random((trials, n)), axis=1)[:, :3] if n <= 50 else _distinct(rng, n, trials)
     rotations, translations = transform_of(source[triples], reference[triples])
-    squares = _squares(rotations, translations, source, reference)
+    squares = squares_of(rotations, translations)
     best = np.argsort(np.partition(squares, quota - 1, axis=1)[:, quota - 1], kind="stable")[:_KEPT]
     squares = squares[best]
     for _ in range(_STEPS):
         nearest = np.argpartition(squares, quota - 1, axis=1)[:, :quota]
         rotations, translations = transform_of(source[nearest], reference[nearest])
-        squares = _squares(rotations, translations, source, reference)
+        squares = squares_of(rotations, translations)
     winner = int(np.argmin(np.partition(squares, quota - 1, axis=1)[:, :quota].sum(axis=1)))
-    return rotations[winner], translations[winner]
+    rotation: Array = rotations[winner]
+    return rotation, translations[winner] + origins[1] - rotation @ origins[0]
 
 
 def _distinct(rng: np.random.Generator, n: int, trials: int) -> NDArray[np.intp]:
@@ -68,8 +72,24 @@ def _distinct(rng: np.random.Generator, n: int, trials: int) -> NDArray[np.intp]
     return np.stack([first, second, third], axis=1)
 
 
-def _squares(rotations: Array, translations: Array, source: Array, reference: Array) -> Array:
-    """Squared residual lengths (b, n) of b transforms."""
-    predicted = np.einsum("bij,nj->bni", rotations, source) + translations[:, None, :]
-    squares: Array = np.sum((predicted - reference) ** 2, axis=-1)
-    return squares
+class _Squares:
+    """Squared residual lengths of many transforms as one matrix product.
+
+    ``|R s + t - r|^2 = |s|^2 + |r|^2 + |t|^2 - 2 R:(r s') + 2 (R' t).s - 2 t.r`` is linear in what a pair brings.
+    """
+
+    def __init__(self, source: Array, reference: Array) -> None:
+        products = (reference[:, :, None] * source[:, None, :]).reshape(-1, 9)
+        own = np.einsum("nk,nk->n", source, source) + np.einsum("nk,nk->n", reference, reference)
+        self.pairs = np.hstack([products, source, reference, own[:, None], np.ones((len(source), 1))]).T
+
+    def of(self, rotations: Array, translations: Array) -> Array:
+        """Squares (b, n) [mm^2] for rotations (b, 3, 3) and translations (b, 3)."""
+        count = len(rotations)
+        turned = np.einsum("bij,bi->bj", rotations, translations)
+        constant = np.einsum("bi,bi->b", translations, translations)[:, None]
+        transforms = np.hstack(
+            [-2.0 * rotations.reshape(count, 9), 2.0 * turned, -2.0 * translations, np.ones((count, 1)), constant]
+        )
+        squares: Array = transforms @ self.pairs
+        return np.maximum(squares, 0.0, out=squares)

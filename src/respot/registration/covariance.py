@@ -12,7 +12,8 @@ def unit_covariance(points: Array) -> tuple[Array, Array]:
     """Covariance of a rigid transform for noise of variance 1 per coordinate.
 
     A perturbed prediction is ``p' = c + exp([w]x) (p - c) + t`` with ``c`` the centroid, so each point has the rows
-    ``J = [I, -[p - c]x]``; the covariance of ``(t, w)`` is the inverse of the sum of ``J'J``.
+    ``J = [I, -[p - c]x]``; the covariance of ``(t, w)`` is the inverse of the sum of ``J'J``, which about the centroid
+    has the blocks ``n I`` and ``sum(|d|^2 I - d d')`` and no others.
 
     Parameters
     ----------
@@ -27,8 +28,11 @@ def unit_covariance(points: Array) -> tuple[Array, Array]:
         The point about which it holds [mm].
     """
     centroid = points.mean(axis=0)
-    rows = jacobian(points - centroid).reshape(-1, 6)
-    covariance = np.asarray(np.linalg.inv(rows.T @ rows), dtype=np.float64)
+    offsets = points - centroid
+    scatter = offsets.T @ offsets
+    covariance = np.zeros((6, 6))
+    covariance[:3, :3] = np.eye(3) / len(points)
+    covariance[3:, 3:] = np.linalg.inv(np.trace(scatter) * np.eye(3) - scatter)
     return covariance, np.asarray(centroid, dtype=np.float64)
 
 
@@ -49,6 +53,15 @@ def leverage(points: Array, fitted: Array) -> Array:
     The mean over the three coordinates of ``diag(J C J')``; a new measurement scatters with ``1 + leverage``.
     """
     covariance, centroid = unit_covariance(fitted)
-    rows = jacobian(points - centroid)
-    result: Array = np.einsum("nik,kl,nil->n", rows, covariance, rows) / 3.0
+    return unit_leverage(points - centroid, covariance)
+
+
+def unit_leverage(offsets: Array, covariance: Array) -> Array:
+    """As `leverage`, for ``offsets`` (m, 3) from the centroid [mm] and the ``covariance`` of `unit_covariance`.
+
+    About the centroid t and w are uncorrelated: ``trace(J C J') = trace(C_tt) + d' (trace(C_ww) I - C_ww) d``.
+    """
+    turning = covariance[3:, 3:]
+    form = np.trace(turning) * np.eye(3) - turning
+    result: Array = (np.trace(covariance[:3, :3]) + np.einsum("ni,ni->n", offsets @ form, offsets)) / 3.0
     return result

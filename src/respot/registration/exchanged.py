@@ -4,8 +4,8 @@ Candidates: a robust fit over the pairs as named; its outliers are assigned anew
 (linear sum assignment); the permutation falls into cycles: two spots exchanged, or three and more passed round.
 
 A cycle is accepted only if all of these hold, judged by the least-squares fit over the inliers *without* the cycle's
-own members, so that none of them takes part in its own trial (a held-out prediction; t is 99.9 % of chi with 3 degrees
-of freedom times the robust scale, widened by each member's leverage):
+own members, so that none of them takes part in its own trial (a held-out prediction; t is the inliers' threshold,
+99.9 % of F, widened by each member's leverage):
 
 1. as named, every member misses its place by more than t, and by more than t would be if noise along every axis were
    that of the inliers' widest (spots are spaced by hand along a flange: near neighbours must not pass for exchanged);
@@ -33,6 +33,7 @@ from respot.registration.leave_one_out import leave_one_out
 from respot.registration.permutation import placement_p_value
 from respot.registration.rigid import check_pairs, fit_rigid
 from respot.registration.robust import INLIER_CHI, RobustFit, fit_robust
+from respot.registration.row_order import own_order
 from respot.registration.statistics import residual_directions, rms
 
 Array = NDArray[np.float64]
@@ -240,5 +241,17 @@ def _evidence(
         worst_before=float(trial.before.max()),
         worst_after=float(trial.after.max()),
         threshold=robust.threshold,
-        p_value=placement_p_value(robust.rigid.predict(source), reference, permutation, cycle, seed=seed),
+        p_value=_placement(robust.rigid.predict(source), reference, permutation, cycle, seed),
+    )
+
+
+def _placement(predicted: Array, reference: Array, permutation: Rows, cycle: Rows, seed: int) -> float:
+    """`placement_p_value` with rows in an order of their own, so that the order of the table plays no part."""
+    order = own_order(predicted, reference)
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order))
+    members = place[cycle]
+    first = int(np.argmin(members))
+    return placement_p_value(
+        predicted[order], reference[order], place[permutation[order]], np.roll(members, -first), seed=seed
     )

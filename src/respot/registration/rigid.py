@@ -22,6 +22,10 @@ COLLINEAR_TOLERANCE = 1e-3
 At one thousandth, a metre of spots strays a millimetre from its line: as much as spots are uncertain,
 so that the rotation about the line would be noise."""
 
+BLOCK = 4096
+"""Pairs summed at once: what they need stays in the cache, large tables take no copies, and products are too small for
+a linear algebra library to spread over threads, which costs more than it gains."""
+
 
 @dataclass(frozen=True, eq=False)
 class RigidFit:
@@ -171,14 +175,13 @@ def fit_rigid(
     used = share > 0
     if int(used.sum()) < 3:
         raise RegistrationError("TOO_FEW_PAIRS", f"{int(used.sum())} pairs take part, at least 3 are needed")
-    spread = _principal_spread(first, share)
-    if checked:
-        _require_plane(spread, "source")
-        _require_plane(_principal_spread(second, share), "reference")
-
     share = share / share.sum()
     source_mean, reference_mean = share @ first, share @ second
-    covariance = ((first - source_mean) * share[:, None]).T @ (second - reference_mean)
+    own, other, covariance = _scatters(first, second, source_mean, reference_mean, share)
+    spread = _principal_spread(own)
+    if checked:
+        _require_plane(spread, "source")
+        _require_plane(_principal_spread(other), "reference")
     rotation, values, sign = rotations_from_covariance(covariance)
     if checked and values[1] + sign * values[2] <= COLLINEAR_TOLERANCE**2 * values[0]:
         raise DegenerateError(
@@ -186,21 +189,37 @@ def fit_rigid(
             "the rotation about that direction is not determined"
         )
     translation = reference_mean - rotation @ source_mean
+    residuals = np.empty_like(first)
+    for begin in range(0, len(first), BLOCK):
+        rows = slice(begin, begin + BLOCK)
+        residuals[rows] = first[rows] @ rotation.T + translation - second[rows]
     return RigidFit(
         rotation=rotation,
         translation=translation,
-        residuals=first @ rotation.T + translation - second,
+        residuals=residuals,
         spread=spread,
         rank=int(np.sum(spread > COLLINEAR_TOLERANCE * spread[0])),
         mirrored=bool(sign < 0 and values[2] > COLLINEAR_TOLERANCE * values[0]),
     )
 
 
-def _principal_spread(points: Array, weights: Array) -> Array:
-    share = weights / weights.sum()
-    centred = points - share @ points
-    values = np.linalg.eigvalsh((centred * share[:, None]).T @ centred)
-    spread: Array = np.sqrt(np.clip(values[::-1], 0.0, None))
+def _scatters(
+    source: Array, reference: Array, source_mean: Array, reference_mean: Array, share: Array
+) -> tuple[Array, Array, Array]:
+    """Weighted sums of outer products about the means: source, reference, source with reference."""
+    own, other, across = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
+    for begin in range(0, len(source), BLOCK):
+        rows = slice(begin, begin + BLOCK)
+        first, second = source[rows] - source_mean, reference[rows] - reference_mean
+        weighted = first * share[rows, None]
+        own += weighted.T @ first
+        across += weighted.T @ second
+        other += (second * share[rows, None]).T @ second
+    return own, other, across
+
+
+def _principal_spread(scatter: Array) -> Array:
+    spread: Array = np.sqrt(np.clip(np.linalg.eigvalsh(scatter)[::-1], 0.0, None))
     return spread
 
 

@@ -2,7 +2,8 @@
 
 Iteratively reweighted least squares on the *norm* of each residual vector (so that turning the frame changes
 nothing): least squares, then Huber weights, then Tukey's biweight (P. J. Huber, *Robust Statistics*, 1981; V. Yohai,
-Ann. Statist. 15 (1987)). A consensus start takes over where it finds a far smaller scale.
+Ann. Statist. 15 (1987)). A consensus start takes over where it finds a far smaller scale. From the core that this finds
+the outlier test decides, each pair by the least-squares fit of the others (`respot.registration.outlier_test`).
 """
 
 from __future__ import annotations
@@ -15,20 +16,27 @@ from scipy import stats
 
 from respot.registration.consensus import consensus_transform, quota_of
 from respot.registration.errors import DegenerateError, RegistrationError
-from respot.registration.rigid import RigidFit, check_pairs, fit_rigid, transform_of
+from respot.registration.outlier_test import PARAMETERS, SCALE_FLOOR, f_limit, noise_of, settle_inliers
+from respot.registration.rigid import (
+    BLOCK,
+    RigidFit,
+    check_pairs,
+    fit_rigid,
+    rotations_from_covariance,
+    transform_of,
+)
 
 Array = NDArray[np.float64]
 Transform = tuple[Array, Array]
 
-RIGID_PARAMETERS = 6
 INLIER_CHI = float(stats.chi.ppf(0.999, 3))
-SCALE_FLOOR = 1e-3  # mm; a finer scale than a micrometre is printing, not noise
 _MEDIAN_CHI = float(stats.chi.median(3))
 _HUBER = float(stats.chi.ppf(0.90, 3))
 _TUKEY = 5.5
 _MANY_BAD = 0.6  # the consensus start is taken where its scale is below this share of the other's (large tables)
 _SAMPLE = 20_000  # larger tables find their basin on an even sample of this size
 _TURNS = 30
+_FULL_TURNS = 6  # over all pairs of a large table; the sample leaves little to do
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,9 +51,10 @@ class RobustFit:
     weights : (n,) array
         Tukey weight of each pair at the solution, 0 to 1: how typical the pair is. The fit itself weighs inliers 1.
     scale : float
-        Noise per coordinate, from the median residual of the inliers [mm].
+        Noise per coordinate that the inliers leave, ``sqrt(SSR / (3 m - 6))`` [mm].
     threshold : float
-        Largest residual length of an inlier [mm]: 99.9 % of chi with 3 degrees of freedom times ``scale``.
+        How far a pair may lie from where all inliers predict it [mm], before the widening by its leverage: 99.9 % of F
+        with 3 and 3 m - 6 degrees of freedom for m inliers.
     start : str
         ``"least-squares"`` or ``"consensus"``: the start that led here.
     """
@@ -58,7 +67,7 @@ class RobustFit:
     start: str
 
 
-def robust_scale(lengths: Array, parameters: int = RIGID_PARAMETERS) -> float:
+def robust_scale(lengths: Array, parameters: int = PARAMETERS) -> float:
     """Noise per coordinate [mm] from residual lengths (n,), with the small-sample factor sqrt(3n / (3n - parameters)).
 
     The median of the lengths over the median of chi with 3 degrees of freedom; never below `SCALE_FLOOR`.
@@ -86,34 +95,78 @@ def fit_robust(source: ArrayLike, reference: ArrayLike, *, seed: int = 0) -> Rob
         All pairs, or the inliers, lie on a line.
     """
     first, second = check_pairs(source, reference, minimum=4)
-    plain = fit_rigid(first, second, checked=False)
     step = max(1, -(-len(first) // _SAMPLE))
     sample, target = first[::step], second[::step]
-
-    start, transform = "least-squares", _settle(sample, target, (plain.rotation, plain.translation))
-    scale = robust_scale(_lengths(sample, target, transform))
-    agreed = consensus_transform(sample, target, seed=seed)
-    agreed_scale = _quota_scale(_lengths(sample, target, agreed))
-    quota = quota_of(len(sample))
-    clearly = _MANY_BAD * (1.0 - RIGID_PARAMETERS / (3.0 * quota)) ** 2  # few pairs agree closely by chance alone
-    if _inliers(sample, target, agreed, agreed_scale)[1] < clearly * _inliers(sample, target, transform, scale)[1]:
-        start, transform, scale = "consensus", agreed, agreed_scale
-    inliers, scale = _inliers(first, second, transform, scale)
+    core, start = _core(sample, target, seed)
+    inliers = settle_inliers(sample, target, core)
+    if step > 1 and int(inliers.sum()) >= 4:
+        inliers = _among_all(first, second, sample[inliers], target[inliers])
     try:
         rigid = fit_rigid(first, second, inliers.astype(np.float64))
     except DegenerateError as error:
         raise DegenerateError(f"of the {int(inliers.sum())} pairs that agree with each other, {error}") from error
     except RegistrationError:
         inliers, rigid, start = np.ones(len(first), dtype=bool), fit_rigid(first, second), "least-squares"
-    lengths = np.linalg.norm(rigid.residuals, axis=1)
-    return RobustFit(rigid, inliers, _tukey(lengths / scale), scale, INLIER_CHI * scale, start)
+    lengths = np.sqrt(np.einsum("nk,nk->n", rigid.residuals, rigid.residuals))
+    count = int(inliers.sum())
+    scale = noise_of(float(np.sum(np.square(lengths[inliers]))), count)
+    threshold = scale * float(np.sqrt(f_limit(count)))
+    return RobustFit(rigid, inliers, _tukey(lengths / scale), scale, threshold, start)
+
+
+def _core(source: Array, reference: Array, seed: int) -> tuple[NDArray[np.bool_], str]:
+    """Pairs that belong together, and the start that found them."""
+    start, transform = "least-squares", _settle(source, reference, transform_of(source, reference))
+    scale = robust_scale(_lengths(source, reference, transform))
+    agreed = consensus_transform(source, reference, seed=seed)
+    agreed_scale = _quota_scale(_lengths(source, reference, agreed))
+    clearly = _MANY_BAD * (1.0 - PARAMETERS / (3.0 * quota_of(len(source)))) ** 2  # few agree closely by chance alone
+    core, scale = _inliers(source, reference, transform, scale)
+    other, other_scale = _inliers(source, reference, agreed, agreed_scale)
+    return (other, "consensus") if other_scale < clearly * scale else (core, start)
+
+
+def _among_all(source: Array, reference: Array, sample: Array, target: Array) -> NDArray[np.bool_]:
+    """Inliers (n,) among all pairs of a large table, from the inliers of a sample of it.
+
+    The outlier test as it is for very many inliers: the prediction is certain beside the noise.
+    """
+    rotation, translation = transform_of(sample, target)
+    noise = noise_of(float(np.sum(np.square(_lengths(sample, target, (rotation, translation))))), len(sample))
+    origins = sample.mean(axis=0), target.mean(axis=0)
+    inliers = np.zeros(len(source), dtype=bool)
+    count = len(sample)
+    for _ in range(_FULL_TURNS):
+        limit = f_limit(count) * noise**2
+        cross, first_sum, second_sum = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
+        count, changed, square_sum = 0, 0, 0.0
+        for begin in range(0, len(source), BLOCK):
+            rows = slice(begin, begin + BLOCK)
+            first, second = source[rows] - origins[0], reference[rows] - origins[1]
+            residuals = first @ rotation.T + (rotation @ origins[0] + translation - origins[1]) - second
+            squares = np.einsum("nk,nk->n", residuals, residuals)
+            inside = squares <= limit
+            changed += int(np.count_nonzero(inside != inliers[rows]))
+            inliers[rows] = inside
+            share = inside.astype(np.float64)
+            square_sum += float(share @ squares)
+            count += int(np.count_nonzero(inside))
+            first_sum += share @ first
+            second_sum += share @ second
+            cross += (first * share[:, None]).T @ second
+        if changed == 0:
+            break
+        rotation = rotations_from_covariance(cross - np.outer(first_sum, second_sum) / count)[0]
+        translation = second_sum / count + origins[1] - rotation @ (first_sum / count + origins[0])
+        noise = noise_of(square_sum, count)
+    return inliers
 
 
 def _quota_scale(lengths: Array) -> float:
     """Noise per coordinate from the closest 45 % alone, as `robust_scale` from the closest half."""
     n = len(lengths)
     quota = quota_of(n)
-    factor = np.sqrt(3.0 * quota / (3.0 * quota - RIGID_PARAMETERS))
+    factor = np.sqrt(3.0 * quota / (3.0 * quota - PARAMETERS))
     return max(
         float(np.partition(lengths, quota - 1)[quota - 1] / stats.chi.ppf(quota / (n + 1), 3) * factor), SCALE_FLOOR
     )

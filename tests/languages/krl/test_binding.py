@@ -14,6 +14,9 @@ from tests.languages.krl.binding import base, by_name, issues, moves, read, tool
 # BASE_DATA[1]: origin 1000, 0, 500, turned by 90 degrees about z: (x, y, z) lies at (1000 - y, x, 500 + z)
 # BASE_DATA[2]: origin 0, 200, 0, turned by 180 degrees about x: (x, y, z) lies at (x, 200 - y, -z)
 IN_1, IN_2 = [980, 10, 530], [10, 180, -30]  # of X 10, Y 20, Z 30
+_FRAME = "{X 1.0,Y 0.0,Z 0.0,A 0.0,B 0.0,C 0.0}"
+_CONFIG = "DEFDAT  $CONFIG\nDECL FRAME TOOL_DATA[4]\nDECL FRAME BASE_DATA[4]\n"
+_CONFIG += "".join(f"{kind}_DATA[{n}]={_FRAME}\n" for kind in ("TOOL", "BASE") for n in range(1, 5)) + "ENDDAT\n"
 
 
 def test_frame_data_as_variable_literal_element_and_changed_member():
@@ -317,3 +320,55 @@ def test_the_spot_of_vkrc_is_in_a_fold_below_the_motion():
     (move,) = moves("vkrc_form")
     assert move.weld
     assert move.spot_ids[0] == "10067"
+
+
+# ------------------------------------------------------------------------------------------- what code may have changed
+
+
+def test_the_counter_of_a_loop_has_not_the_value_of_its_declaration():
+    in_loop, after = moves("loop_counter_of_the_data_list")
+    assert (in_loop.target, in_loop.codes) == (None, ("RUN_TIME_POSE",))
+    assert (str(after.target), after.codes) == ("XA[1]", ())
+
+
+def test_what_an_unread_statement_assigns_to_is_not_known():
+    found = by_name("assigned_by_an_unread_statement")
+    assert {name: move.codes for name, move in found.items()} == {
+        "XP1": ("RUN_TIME_POSE",),
+        "XP2": ("RUN_TIME_POSE",),
+        "XP3": (),  # compared, and only on the right
+        "XA[1]": ("RUN_TIME_POSE",),
+    }
+
+
+def test_positions_of_the_system():
+    found = moves("system_positions")
+    # where the robot is or was, or its home: these follow the robot
+    assert [(move.target, move.unknown) for move in found[:5]] == [(None, "")] * 5
+    origin, product, root, none = found[5:]
+    assert (origin.target, origin.codes) == (None, ("UNKNOWN_TARGET",))
+    assert "origin of the base" in origin.unknown
+    assert (product.target, product.codes) == (None, ("RUN_TIME_POSE",))
+    assert product.unknown.startswith("$NULLFRAME:XP1 starts from $NULLFRAME")
+    assert (root.target, root.codes) == (None, ("RUN_TIME_POSE",))
+    assert (none.target, none.codes) == (None, ("RUN_TIME_POSE",))
+
+
+def test_torque_monitoring_leaves_frames_alone():
+    # tm_bib.src of KSS 8.3 writes FHOME.TQ_STATE
+    first, second = moves("torque_state_written")
+    assert (base(first), first.codes) == ("BASE_DATA[1]", ())
+    assert (base(second), second.codes) == (None, ("UNKNOWN_FRAME", "UNKNOWN_TOOL"))
+
+
+def test_a_constant_tells_which_frame_is_written():
+    robot = read("frames_written_by_constants", **{"$config__dat": _CONFIG})
+    assert [frame.unknown for frame in robot.bases] == ["", "", "the program assigns to it", ""]
+    # a name of the routine's own hides the constant
+    assert {frame.unknown for frame in robot.tools} == {"the program assigns to it"}
+
+
+def test_a_number_that_code_changes_may_be_any():
+    more = {"$config__dat": _CONFIG, "weld__src": "DEF weld( )\nSET_LATER=2\nBASE_DATA[SET_LATER]=$NULLFRAME\nEND\n"}
+    robot = read("frames_written_by_constants", **more)
+    assert {frame.unknown for frame in robot.bases} == {"the program assigns to it"}

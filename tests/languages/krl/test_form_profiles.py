@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from respot.issues import BadInputError
-from respot.languages.forms import read_profile
 from respot.languages.krl.forms import FORMS
+from respot.languages.profile_file import read_profile
 from respot.program.moves import Label, LabelKind
 from tests.languages.krl.inline_forms import change, read, src
 

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from respot.languages.forms import read_profile
+from respot.languages.profile_file import read_profile
 from respot.languages.rapid.calls import read_lines
 from respot.languages.rapid.forms import FORMS, read_instruction
 from respot.languages.rapid.robot import read_robots
@@ -358,3 +358,34 @@ def test_a_plant_profile_names_its_wrapper(tmp_path):
     assert world(move) == pytest.approx([1000, 1, 500])
     (unknown,) = moves_of(robot_of(more=module(body)))
     assert (unknown.weld, unknown.codes) == (False, ("RUN_TIME_POSE",))
+
+
+def test_the_counter_of_a_loop_hides_a_constant():
+    data = """  CONST num i:=1;
+  CONST num last:=2;
+  CONST robtarget p{2}:=[[[1,0,0],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],
+                         [[2,0,0],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]];"""
+    body = """    FOR I FROM 1 TO 2 DO
+      MoveL p{i},v100,fine,tool0;
+    ENDFOR
+    MoveL p{last},v100,fine,tool0;"""
+    in_loop, after = moves_of(robot_of(more=module(body, data)))
+    assert (in_loop.target, in_loop.codes) == (None, ("RUN_TIME_POSE",))
+    assert (world(after), after.codes) == ([2, 0, 0], ())
+
+
+def test_what_an_unread_statement_assigns_to_is_not_known():
+    point = "[[%d,0,0],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
+    wobj = '[FALSE,TRUE,"",[[0,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]]'
+    data = "".join(f"  PERS robtarget p{number}:={point % number};\n" for number in (1, 2, 3))
+    data += f"  PERS wobjdata wPart:={wobj};\n  PERS wobjdata wOther:={wobj};\n"
+    body = """    p1.trans . x := 5 MM;
+    p2 := p3 MM;
+    wPart:=wOther wOther;
+    Unknown \\wOther:=p3 5;
+    MoveL p1,v100,fine,tool0;
+    MoveL p2,v100,fine,tool0;
+    MoveL p3,v100,fine,tool0\\WObj:=wPart;
+    MoveL p3,v100,fine,tool0\\WObj:=wOther;"""
+    found = moves_of(robot_of(more=module(body, data)))
+    assert [move.codes for move in found] == [("RUN_TIME_POSE",), ("RUN_TIME_POSE",), ("UNKNOWN_FRAME",), ()]

@@ -4,6 +4,6 @@ from __future__ import annotations
 
 from types import ModuleType
 
-from respot.calibration.effects import swapped_ids
+from respot.calibration.effects import swapped_ids, tool_offset
 
-EFFECTS: dict[str, ModuleType] = {swapped_ids.NAME: swapped_ids}
+EFFECTS: dict[str, ModuleType] = {swapped_ids.NAME: swapped_ids, tool_offset.NAME: tool_offset}

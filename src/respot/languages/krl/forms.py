@@ -14,9 +14,10 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-from respot.languages.forms import CopyRule, FormRule, Forms, Profile
+from respot.languages.forms import Forms
 from respot.languages.krl.symbols import Aggregate, Symbol, Symbols, module_key
 from respot.languages.krl.syntax import COMMENT, END_FOLD, FOLD
+from respot.languages.profile import CopyRule, FormRule, Profile
 from respot.program.forms import Contents, Copy, Form, ranked
 from respot.program.statement import Statement
 from respot.source import SourceText, Span

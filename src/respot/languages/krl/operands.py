@@ -22,6 +22,10 @@ from respot.program.targets import Target, TargetKind
 _INDEX = re.compile(r"\[([^\]]*)\]")
 _WHOLE = re.compile(r"\d+(?:,\d+)*")
 _MOST_CALLS = 4
+_POINTS = frozenset(("POS", "E6POS", "E3POS"))
+_ORIGIN = "$NULLFRAME"
+#: System data that follow the robot: where it is, was interrupted, left its path, or has its home.
+_FOLLOWING = re.compile(r"\$(?:(?:POS|AXIS)_(?:ACT|INT|RET|BACK|FOR)(?:_\w+)?|H_POS)(?![\w$])", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -86,9 +90,11 @@ class Operands:
 
     def read(self, node: Node, place: Place) -> Operand:
         """Read the operand of a motion."""
-        if node.kind == "reference" and node.text.startswith("$"):
-            return Operand()  # the position the robot is at
+        if node.kind == "reference" and _FOLLOWING.match(node.text):
+            return Operand()
         operands = list(_operands(node))
+        if len(operands) > 1 and operands[0].text.startswith("$"):
+            return _unknown(f"{node.text} starts from {operands[0].text.strip()}, which is no position in a file")
         if len(operands) > 1 and self._is_composed(operands, place):
             return Operand(doubt=Doubt("RUN_TIME_POSE", f"{node.text} is composed of several positions"))
         # base * (P : F): whatever the operands mean, moving the first moves the product (DESIGN section 5)
@@ -96,6 +102,17 @@ class Operands:
         if len(operands) == 1 or found.target is None:
             return found
         return Operand(found.target, found.doubt, self._product(operands[1:], place))
+
+    def is_pose(self, node: Node, place: Place) -> bool:
+        """Whether an expression is a point of its own: a literal, or a datum of such a type; frames are none."""
+        if node.kind == "aggregate":
+            value = value_of(node)
+            return isinstance(value, Aggregate) and {"X", "Y", "Z", "A", "B", "C"} <= set(value.members)
+        name = self.name_of(node, place) if node.kind == "reference" else None
+        if name is None or bare_name(name.upper()) in place.local:
+            return False
+        symbol = self._symbols.find(name, place.module)
+        return symbol is not None and symbol.type in _POINTS
 
     def constant(self, node: Node, place: Place) -> Symbol | None:
         """Datum that an expression names, if no code changes it."""
@@ -147,6 +164,11 @@ class Operands:
         text = "".join(node.text.split())
         if node.kind != "reference":
             return _unknown(f"{text} is computed while the robot runs")
+        if text.upper() == _ORIGIN:
+            message = f"{text} is the origin of the base or of the held part: no position in a file that could be moved"
+            return Operand(doubt=Doubt("UNKNOWN_TARGET", message))
+        if text.startswith("$"):
+            return _unknown(f"{text} has its value while the robot runs")
         bare = bare_name(text.upper())
         if bare in place.parameters:
             return _unknown(_parameter(text, bare, place))
@@ -201,7 +223,7 @@ class Operands:
         """Pose of a literal frame, or of a declared one that no code changes."""
         if node.kind == "aggregate":
             value: object = value_of(node)
-        elif node.text.strip().upper() == "$NULLFRAME":
+        elif node.text.strip().upper() == _ORIGIN:
             return IDENTITY
         else:
             symbol = self.constant(node, place)
@@ -209,9 +231,7 @@ class Operands:
         return frame_pose(value) if isinstance(value, Aggregate) else None
 
     def _is_composed(self, operands: Sequence[Node], place: Place) -> bool:
-        """Whether any operand but the first is a position of its own, or the first is none."""
-        if operands[0].text.startswith("$"):
-            return True
+        """Whether any operand but the first is a position of its own."""
         for operand in operands[1:]:
             name = operand.text if operand.kind == "reference" else ""
             kind = place.local.get(bare_name(name.upper()))

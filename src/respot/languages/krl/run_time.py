@@ -10,13 +10,34 @@ from respot.languages.forms import Forms
 from respot.languages.krl.blocks import Routine as Block
 from respot.languages.krl.symbols import Aggregate, Symbol, Symbols, bare_name
 from respot.program.statement import OPAQUE, Node, Statement
+from respot.program.targets import Number
 
 MOTIONS = frozenset(("motion", "relative_motion", "circular_motion", "touch_up_motion"))
-_ELEMENT = re.compile(r"[\w$]+\[([\d,]+)\]")
+_ELEMENT = re.compile(r"[\w$]+\[([\w$,]+)\]")
+#: Left side of an assignment within a statement that no rule knows.
+_ASSIGNED = re.compile(r"(?<![\w$.])([\w$]+)(?:\s*\[[^\]]{0,200}\])?(?:\s*\.\s*\w+){0,9}\s*:?=(?!=)")
+#: Members of FDAT that are neither frame nor position: torque monitoring and a second point's name (bas.src).
+_NO_FRAME = ("TQ_STATE", "POINT2")
 #: What an unread statement holds if it might set a frame: its name, or any call.
 _FRAME_WORDS = re.compile(r"\$TOOL\b|\$BASE\b|\$LOAD\b|\$IPO_MODE\b|FDAT_ACT|[\w$]\s*\(", re.IGNORECASE)
 #: Functions of the system that leave frames alone but write into their arguments.
-_WRITING = frozenset(("CREAD", "SREAD", "SWRITE", "CAST_FROM", "CAST_TO", "INVERSE", "FORWARD", "VARSTATE"))
+_WRITING = frozenset(
+    [
+        "CREAD",
+        "SREAD",
+        "SWRITE",
+        "CAST_FROM",
+        "CAST_TO",
+        "INVERSE",
+        "FORWARD",
+        "VARSTATE",
+        "STRTOBOOL",
+        "STRTOINT",
+        "STRTOREAL",
+        "MBX_REC",
+        "MD_GETSTATE",
+    ]
+)
 #: Functions of KSS itself that change neither frames nor positions; those of frames only make values of frames.
 _SYSTEM = frozenset(
     [
@@ -36,6 +57,7 @@ _SYSTEM = frozenset(
         "MD_SETSTATE",
     ]
 )
+_FRAMES = frozenset(("$TOOL", "$BASE", "$LOAD", "$IPO_MODE", "FDAT_ACT"))
 _ASSIGNING = frozenset(("assignments", "trigger", "interrupt_declaration"))
 
 
@@ -96,6 +118,21 @@ class Passed:
     arguments: Sequence[str]
 
 
+class _Elements(set[str]):
+    """Indices of the elements that a module writes; empty for the whole datum and for an index that is computed."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.named: set[str] = set()  # those in which a name stands, which may be a constant
+
+    def add(self, element: str) -> None:
+        """Add an index."""
+        if element.replace(",", "").isdecimal() or not element:
+            super().add(element)
+        else:
+            self.named.add(element)
+
+
 @dataclass
 class RunTime:
     """What the code of a robot changes.
@@ -112,6 +149,10 @@ class RunTime:
         Every routine of the backup, in upper case.
     passed : mapping of str to list of Passed
         Calls of each routine with parameters.
+    heads : mapping of str to list
+        Directions of the parameters of every routine of a name, in upper case; empty for by reference.
+    framing : set of str
+        Routines, in upper case, with a harmless name whose code in this backup sets frames all the same.
     external_tcp : bool
         Something in the backup asks for the external TCP.
     """
@@ -121,22 +162,42 @@ class RunTime:
     moving: set[str] = field(default_factory=set)
     routines: set[str] = field(default_factory=set)
     passed: dict[str, list[Passed]] = field(default_factory=dict)
+    heads: dict[str, list[list[str]]] = field(default_factory=dict)
+    framing: set[str] = field(default_factory=set)
     external_tcp: bool = False
-    _written: dict[str, dict[str, set[str]]] = field(default_factory=dict)
+    _written: dict[str, dict[str, _Elements]] = field(default_factory=dict)
     _switched: set[str] = field(default_factory=set)
 
     def writes(self, symbol: Symbol) -> bool:
         """Whether any code changes a datum or a part of it, itself or through an import."""
         bare = bare_name(symbol.name.upper())
-        written = self._written.get(bare)
-        if not written:
-            return False
         element = _element(symbol.name.upper())
+        if not element.replace(",", "").isdecimal():
+            element = ""
         return any(
-            (not element or "" in elements or element in elements)
+            (not element or "" in elements or element in elements or self._may_be(element, elements, module))
             and self.symbols.owner(bare, module) in (symbol.path, None)
-            for module, elements in written.items()
+            for module, elements in self._written.get(bare, {}).items()
         )
+
+    def _may_be(self, element: str, elements: _Elements, module: str) -> bool:
+        """Whether one of the elements whose index is a name may be this one."""
+        return any(self._number(named, module) in ("", element) for named in elements.named)
+
+    def _number(self, element: str, module: str) -> str:
+        """Return the index of an element in numbers; empty where a name in it may have any value."""
+        numbers = [part if part.isdecimal() else self._constant(part, module) for part in element.split(",")]
+        return ",".join(numbers) if all(numbers) else ""
+
+    def _constant(self, name: str, module: str) -> str:
+        """Whole number that a name stands for, if no code writes it; else empty."""
+        symbol = self.symbols.find(name, module)
+        if symbol is None or symbol.others or not isinstance(symbol.value, Number):
+            return ""
+        if any(self.symbols.owner(name, other) in (symbol.path, None) for other in self._written.get(name, {})):
+            return ""
+        value = symbol.value.value
+        return str(int(value)) if value == int(value) else ""
 
     def switches_on(self, name: str) -> bool:
         """Whether any code sets a switch to something other than FALSE."""
@@ -144,7 +205,16 @@ class RunTime:
 
     def is_harmless(self, routine: str) -> bool:
         """Whether a call is known to change neither frames nor positions."""
-        return routine.upper() in _SYSTEM or self.forms.is_harmless(routine)
+        name = routine.upper()
+        return name not in self.framing and (name in _SYSTEM or self.forms.is_harmless(name))
+
+    def hands_back(self, routine: str, index: int) -> bool:
+        """Whether a call may change what it is handed; local routines of several modules may share a name."""
+        name = routine.upper()
+        if self.is_harmless(name) and name not in _WRITING:
+            return False
+        known = self.heads.get(name, [])
+        return not known or any(index >= len(directions) or directions[index] != "IN" for directions in known)
 
     def may_move(self, routine: str) -> bool:
         """Whether a call may move the robot; nobody knows what a routine outside the backup does."""
@@ -153,7 +223,7 @@ class RunTime:
 
     def add(self, name: str, module: str) -> None:
         """Add a write to a name, with its index and member."""
-        self._written.setdefault(bare_name(name), {}).setdefault(module, set()).add(_element(name))
+        self._written.setdefault(bare_name(name), {}).setdefault(module, _Elements()).add(_element(name))
 
     def add_value(self, name: str, value: str) -> None:
         """Add what is assigned to a name: a switch that is only ever set to FALSE stays off."""
@@ -167,14 +237,18 @@ class RunTime:
         while growing:
             growing = False
             for module, name, there, target in imports:
-                for element in list(self._written.get(name, {}).get(module, ())):
-                    elements = self._written.setdefault(target, {}).setdefault(there, set())
-                    growing |= element not in elements
-                    elements.add(element)
+                found = self._written.get(name, {}).get(module)
+                if found is not None:
+                    elements = self._written.setdefault(target, {}).setdefault(there, _Elements())
+                    before = len(elements)
+                    elements.update(found)
+                    if found.named:
+                        elements.add("")  # names mean others over there
+                    growing |= len(elements) != before
 
 
 def _element(name: str) -> str:
-    """Return the literal index of an element; empty for a whole datum and for an index that is computed."""
+    """Return the index of an element, of numbers and names; empty for a whole datum and for one that is computed."""
     match = _ELEMENT.match(name)
     return match[1] if match else ""
 
@@ -198,17 +272,18 @@ def read_run_time(code: Mapping[str, tuple[str, Iterable[Block]]], forms: Forms,
         for symbol in scope.symbols.values()
         if symbol.type == "FDAT" and isinstance(symbol.value, Aggregate)
     )
-    heads: dict[str, list[list[str]]] = {}
     locals_of: dict[int, dict[str, str]] = {}
     for _, blocks in code.values():
         for block in blocks:
             locals_of[id(block)], parameters = declared_in(block)
-            heads.setdefault(block.name.upper(), []).append([direction for _, direction in parameters])
-    found.routines = set(heads)
+            if found.is_harmless(block.name) and _sets_frames(block):
+                found.framing.add(block.name.upper())
+            found.heads.setdefault(block.name.upper(), []).append([direction for _, direction in parameters])
+    found.routines = set(found.heads)
     calls: dict[str, set[str]] = {}
     for path, (module, blocks) in code.items():
         for block in blocks:
-            reader = _Reader(found, heads, module, path, locals_of[id(block)])
+            reader = _Reader(found, module, path, locals_of[id(block)])
             for statement in block.body:
                 reader.read(statement)
             calls.setdefault(block.name.upper(), set()).update(reader.calls)
@@ -217,6 +292,16 @@ def read_run_time(code: Mapping[str, tuple[str, Iterable[Block]]], forms: Forms,
     found.follow_imports()
     _spread(found.moving, calls)
     return found
+
+
+def _sets_frames(block: Block) -> bool:
+    """Whether a routine itself sets a tool, base or mode."""
+    for statement in block.body:
+        if any(left_of(assignment).partition(".")[0] in _FRAMES for assignment in assignments(statement)):
+            return True
+        if any("".join(token.text for token in node.tokens("NAME")[:1]).upper() == "BAS" for node in called(statement)):
+            return True
+    return False
 
 
 def _spread(names: set[str], calls: Mapping[str, set[str]]) -> None:
@@ -236,13 +321,10 @@ def _spread(names: set[str], calls: Mapping[str, set[str]]) -> None:
 class _Reader:
     """Reads the statements of one routine."""
 
-    def __init__(
-        self, found: RunTime, heads: Mapping[str, list[list[str]]], module: str, path: str, local: Mapping[str, str]
-    ) -> None:
+    def __init__(self, found: RunTime, module: str, path: str, local: Mapping[str, str]) -> None:
         self.calls: set[str] = set()
         self.moves = False
         self._found = found
-        self._heads = heads
         self._module = module
         self._path = path
         self._local = local
@@ -255,6 +337,11 @@ class _Reader:
         elif kind in _ASSIGNING:
             for assignment in statement.node.all("assignment"):
                 self._assignment(assignment)
+        elif kind == "for_":
+            self._write("".join(statement.node.nodes[0].text.split()).upper())  # the counter
+        elif kind == OPAQUE:
+            for match in _ASSIGNED.finditer(statement.source.upper()):
+                self._write(match[1])
         if "#" in statement.source:
             self._found.external_tcp |= kind != "comment" and "#TCP" in statement.source.upper()
         for node in called(statement):
@@ -267,23 +354,23 @@ class _Reader:
             self._found.add_value(name, assignment.nodes[-1].text)
 
     def _write(self, name: str) -> None:
-        if bare_name(name) not in self._local:
-            self._found.add(name, self._module)
+        bare, _, member = name.partition(".")
+        if bare_name(name) in self._local or member.partition("[")[0] in _NO_FRAME:
+            return
+        local = any(part in self._local for part in _element(bare).split(","))
+        self._found.add(bare_name(name) if local else name, self._module)
 
     def _call(self, node: Node, line: int) -> None:
         name = node.tokens("NAME")[0].text.upper()
         self.calls.add(name)
         if self._found.is_harmless(name) and name not in _WRITING:
             return
-        known = self._heads.get(name, [])
         arguments = arguments_of(node)
-        if known and arguments:
+        if name in self._found.heads and arguments:
             texts = [argument.text.strip() for argument in arguments]
             self._found.passed.setdefault(name, []).append(Passed(self._module, self._path, line, texts))
         for index, argument in enumerate(arguments):
-            # local routines of several modules may share a name: any of them may be meant
-            outward = not known or any(index >= len(directions) or directions[index] != "IN" for directions in known)
-            if argument.kind == "reference" and outward:
+            if argument.kind == "reference" and self._found.hands_back(name, index):
                 text = "".join(argument.text.split()).upper()
                 self._write(text)
                 if bare_name(text).endswith("_ON"):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from decimal import Decimal
 from typing import TypeAlias
 
 from respot.issues import Issue
@@ -23,6 +24,8 @@ Value: TypeAlias = "Number | str | Aggregate"
 #: Members of the system's own structures that are positions.
 _BUILT_IN = {"LOAD": {"CM": "FRAME"}}
 _MOST_NAMES = 5
+#: Base of ``'B0101'``, ``'H1F'``, ``'D10'`` by its letter.
+_BASES = {"B": 2, "H": 16, "D": 10}
 
 
 @dataclass(frozen=True)
@@ -122,7 +125,7 @@ def bare_name(name: str) -> str:
 
 def value_of(node: Node) -> Value:
     """Value of an expression; what is neither number nor aggregate is its text."""
-    number = number_of(node)
+    number = number_of(node) or _bits(node)
     if number is not None:
         return number
     if node.kind == "aggregate":
@@ -136,6 +139,15 @@ def value_of(node: Node) -> Value:
             members[name] = value_of(nodes[-1])
         return Aggregate(members, names[0].text.upper() if names else "", node.span)
     return node.text
+
+
+def _bits(node: Node) -> Number | None:
+    """Return the number of a bit string such as ``'B0101'``, in which status and turn are often written."""
+    base = _BASES.get(node.text[1:2].upper()) if node.kind == "bits" else None
+    try:
+        return None if base is None else Number(Decimal(int(node.text[2:-1], base)), node.span)
+    except ValueError:  # 'B2'
+        return None
 
 
 def read_symbols(path: str, statements: Iterable[Statement], module: str, everywhere: bool = False) -> Scope:

@@ -141,8 +141,10 @@ class Walk:
             for assignment in statement.node.all("assignment"):
                 self._assign(assignment)
         elif kind == "call":
+            self._run_calls(statement)
             self._call(statement.node, statement.line)
         elif kind in MOTIONS:
+            self._run_calls(statement)
             self._motion(statement)
         elif kind == "spline":
             self._splines.append(self._state)
@@ -173,12 +175,15 @@ class Walk:
         """Follow the calls within a statement: functions, triggers, interrupts."""
         later = statement.kind in ("trigger", "interrupt_declaration")
         for node in called(statement):
+            if node.kind == "call" and not later:
+                continue  # the statement itself
             name = node.tokens("NAME")[0].text if node.tokens("NAME") else ""
             if later and name.upper() == "BAS":
                 self._state = self._state.forget(SLOTS, "a trigger or interrupt calls BAS")
             elif name and not self._run_time.is_harmless(name):
                 self.steps.append(Call(name, statement.line))
                 self._state = self._follow(name, self._state, later)
+                self._state = self._state.forget(self._handed(node, name), f"{name} gets it and may change it")
 
     def _loops(self) -> dict[int, set[str]]:
         """Slots that each loop may set, by the place of its head; its condition runs with every turn."""
@@ -209,8 +214,17 @@ class Walk:
                 touched |= self._data.bas(State(), arguments_of(node), self._place).touched()
                 touched |= {"tool", "base", "load", "external"} if "PARAMS" in node.text.upper() else set()
             elif name and not self._run_time.is_harmless(name):
-                touched.update(self._touch(name))
+                touched.update(self._touch(name), self._handed(node, name))
         return touched
+
+    def _handed(self, call: Node, name: str) -> set[str]:
+        """Slots that a call gets as arguments and may change."""
+        found: set[str] = set()
+        for index, argument in enumerate(arguments_of(call)):
+            slots = self._data.slots_of("".join(argument.text.split()).upper())
+            if slots and self._run_time.hands_back(name, index):
+                found.update(slots)
+        return found
 
     def _follow_blocks(self, kind: str) -> None:
         if kind in _BRANCHES or kind in _LOOPS:
@@ -253,11 +267,25 @@ class Walk:
         texts = [argument.text.strip() for argument in arguments]
         if self._forms.welds(name, texts):
             self._weld(texts)
-            return
         if not name or self._run_time.is_harmless(name):
             return
+        if name.upper() not in self._run_time.routines:
+            self._hand_over(name, arguments, line)
         self.steps.append(Call(name, line))
         self._state = self._follow(name, self._state, False)
+        self._state = self._state.forget(self._handed(node, name), f"{name} gets it and may change it")
+
+    def _hand_over(self, name: str, arguments: Sequence[Node], line: int) -> None:
+        """Add the positions that a routine outside of the backup is handed: it may go there, and nobody knows how."""
+        reason = f"the position is handed to {name}, which is not in this backup"
+        place = self._place.at(f"{name}@{line}")
+        for argument in arguments:
+            if self._operands.is_pose(argument, place):
+                target = self._operands.read(argument, place).target
+                operand = Operand(target, Doubt("RUN_TIME_POSE", f"{argument.text.strip()}: {reason}"))
+                labels = [Label(LabelKind.ROUTINE, self._block.name)]
+                draft = Draft(Motion.LINEAR, name, line, State.unknown(reason), operand, labels, self._folds.form)
+                self.steps.append(draft)
 
     def _weld(self, arguments: Sequence[str]) -> None:
         """Mark the last motion, if no other routine moved since, as one that welds.

@@ -58,7 +58,7 @@ def read_robots(name: str, root: str, files: Mapping[str, bytes], forms: Forms =
         task: [read_module(path, read[path].program, layouts[path]) for path in paths]
         for task, paths in _tasks(root, read).items()
     }
-    run_times = read_run_time(tasks)
+    run_times = read_run_time(tasks, forms)
     bound = {
         task: _bind(task, modules, {module.path: read[module.path] for module in modules}, run_times[task], forms)
         for task, modules in tasks.items()

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from respot.languages.forms import Forms
 from respot.languages.rapid.blocks import Routine as Block
 from respot.languages.rapid.calls import Argument, Invocation
+from respot.languages.rapid.forms import FORMS, instruction_form
 from respot.languages.rapid.records import POSITIONS
 from respot.languages.rapid.symbols import Module, Parameter, Symbol, Task
-from respot.program.statement import Node
+from respot.program.statement import OPAQUE, Node
 
 #: Motions that write where they found something into their second argument.
 _SEARCHING = frozenset(("searchl", "searchc"))
@@ -20,9 +23,11 @@ _WRITING = frozenset(
     (
         "strtoval", "unpackrawbytes", "readanybin", "readrawbytes", "getsysdata", "getdataval", "readvar", "readblock",
         "readcfgdata", "mtooltcpcalib", "mtoolrotcalib", "stooltcpcalib", "stoolrotcalib", "recalctcp", "getnextsym",
-        "alignwobj", "waittestandset",
+        "alignwobj", "waittestandset", "rmqgetmsgdata",
     )
 )  # fmt: skip
+#: What a statement that no rule knows assigns to; an argument such as ``\WObj:=`` is none.
+_ASSIGNED = re.compile(r"(?<![\w.\\])([A-Za-z]\w*)(?:\s*\{[^}]{0,200}\})?(?:\s*\.\s*\w+){0,9}\s*:=")
 _BY_NAME = frozenset(("setdataval", "setalldataval"))
 _BY_REFERENCE = frozenset(("INOUT", "VAR", "PERS"))
 #: What a datum that is set by a computed name may be, where the value does not tell its type.
@@ -71,9 +76,9 @@ class RunTime:
         return symbol.shared and (symbol.name.lower(), symbol.type) in self.shared
 
 
-def read_run_time(tasks: Mapping[str, Sequence[Module]]) -> dict[str, RunTime]:
+def read_run_time(tasks: Mapping[str, Sequence[Module]], forms: Forms = FORMS) -> dict[str, RunTime]:
     """Read what the code of each task changes."""
-    readers = {name: _Reader(Task(modules)) for name, modules in tasks.items()}
+    readers = {name: _Reader(Task(modules), forms) for name, modules in tasks.items()}
     declared: dict[tuple[str, str], dict[str, Symbol]] = {}
     for name, reader in readers.items():
         for module in reader.task.modules:
@@ -97,8 +102,9 @@ def read_run_time(tasks: Mapping[str, Sequence[Module]]) -> dict[str, RunTime]:
 class _Reader:
     """One pass over the code of a task."""
 
-    def __init__(self, task: Task) -> None:
+    def __init__(self, task: Task, forms: Forms) -> None:
         self.task = task
+        self._forms = forms
         self.run_time = RunTime()
         #: data that are set by name in whatever task
         self.named_in_all_tasks: set[str] = set()
@@ -127,6 +133,10 @@ class _Reader:
                 self._change(self.task.find(name, module, local), block)
             for call in line.calls:
                 self._read_call(call, block, module, local)
+        for statement in block.body:
+            if statement.kind == OPAQUE:
+                for match in _ASSIGNED.finditer(statement.source):
+                    self._change(self.task.find(match[1], module, local), block)
 
     def _change(self, symbol: Symbol | None, block: Block) -> bool:
         """Note that a routine changes a datum; whether that is new about a parameter of its own."""
@@ -145,14 +155,16 @@ class _Reader:
         if name in _BY_NAME:
             self._set_by_name(name, call, module, local)
             return
-        callee = self.task.routine(name, module)
-        if callee is not None:
-            for parameter, argument in bound(self.task.parameters(callee[0]), call.arguments()):
+        callees = self._callees(call, module)
+        for callee in callees:
+            for parameter, argument in bound(self.task.parameters(callee), call.arguments()):
                 symbol = self._datum(argument, module, local)
                 if symbol is not None and parameter.access in _BY_REFERENCE:
-                    key = (id(callee[0]), parameter.name.lower())
+                    key = (id(callee), parameter.name.lower())
                     self._handed.setdefault(key, []).append((block, symbol))
-        elif name in _SEARCHING or name in _COUNTING:
+        if callees:
+            return
+        if name in _SEARCHING or name in _COUNTING:
             positional = [item for item in call.arguments() if item.kind == "argument"]
             changed = positional[1:2] if name in _SEARCHING else positional[:1]
             for argument in changed:
@@ -161,6 +173,33 @@ class _Reader:
             for argument in call.arguments():
                 for reference in _references(argument.value):
                     self._change(self.task.find(reference, module, local), block)
+
+        elif not call.is_function and instruction_form(name) is None and not self._forms.is_harmless(name):
+            self._read_unknown(call, block, module, local)
+
+    def _callees(self, call: Invocation, module: Module) -> list[Block]:
+        """Routines that a call may mean; of one that is bound late all whose names begin alike."""
+        if call.name:
+            found = self.task.routine(call.name, module)
+            return [] if found is None else [found[0]]
+        name = call.late_name()
+        start = "" if name is None else literal_start(name).lower()
+        return [
+            block
+            for other in self.task.modules
+            for key, block in other.routines.items()
+            if key.startswith(start) and (not block.local or other is module)
+        ]
+
+    def _read_unknown(self, call: Invocation, block: Block, module: Module, local: dict[str, Symbol]) -> None:
+        """Count a work object as changed that a routine outside of the backup is handed, unless as that of a motion."""
+        given = [item for item in call.arguments() if not item.name]
+        symbols = [symbol for item in given if (symbol := self._datum(item, module, local)) is not None]
+        types = [self.task.type_of(symbol.type, module) for symbol in symbols]
+        if not POSITIONS & set(types) and not any(item.value and item.value.kind == "aggregate" for item in given):
+            for symbol, kind in zip(symbols, types, strict=True):
+                if kind == "wobjdata":
+                    self._change(symbol, block)
 
     def _datum(self, argument: Argument, module: Module, local: dict[str, Symbol]) -> Symbol | None:
         name = argument.given

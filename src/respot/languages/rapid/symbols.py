@@ -56,7 +56,7 @@ class Symbol:
     name, type : str
         As declared; the type in lower case.
     storage : str
-        ``CONST``, ``PERS``, ``VAR``, or ``parameter``.
+        ``CONST``, ``PERS``, ``VAR``, ``parameter``, or ``counter`` of a FOR loop.
     path : str
         File.
     line : int
@@ -260,6 +260,11 @@ def routine_symbols(path: str, block: Block) -> dict[str, Symbol]:
         symbol = data_symbol(path, statement) if statement.kind == "data" else None
         if symbol is not None:
             found[symbol.name.lower()] = replace(symbol, local=True)
+    for statement in block.body:
+        if statement.kind == "for_":
+            counter = statement.node.nodes[0].text  # hides a constant of its name while the loop runs
+            if counter.lower() not in found or found[counter.lower()].storage == "CONST":
+                found[counter.lower()] = Symbol(counter, "num", "counter", path, statement.line, local=True)
     return found
 
 

@@ -10,7 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from respot.issues import Issue
-from respot.languages.forms import Forms, WrapperRule
+from respot.languages.forms import Forms
+from respot.languages.profile import WrapperRule
 from respot.languages.rapid.blocks import Routine as Block
 from respot.languages.rapid.calls import Argument, Invocation, Line
 from respot.languages.rapid.displacement import Displacements
