@@ -111,6 +111,7 @@ CODES: dict[str, tuple[Level, str]] = {
     "EXTERNAL_OFFSET": (_W, "code shifts external axes while the robot runs"),
     "LATE_BINDING": (_W, "a routine is chosen while the robot runs; respot does not follow the call"),
     "RUN_TIME_POSE": (_E, "the position of a motion is computed while the robot runs"),
+    "RUN_TIME_SHIFT": (_W, "a motion is shifted along the tool by what is computed while the robot runs"),
     "EXTERNAL_TCP": (_E, "external TCP and held gun are mixed: one transform cannot hold for both"),
     "AMBIGUOUS_SPOT": (_E, "a spot ID stands for several different weld targets"),
     # correcting

@@ -162,6 +162,25 @@ def test_converting_one_robot_leaves_the_other_as_it_was(respot, tmp_path, task,
     assert {path.as_posix() for path in old if old[path] != new[path]} == {f"RAPID/{folder}/PROGMOD/Weld.mod"}
 
 
+def test_robots_of_one_controller_are_converted_one_after_the_other(respot, tmp_path):
+    write(tmp_path / "SYS1", two_robots())
+    calibration = Calibration(np.eye(3), np.array([3.0, -2.0, 1.0]), "theory", "same", tuple(SPOTS))
+    (tmp_path / "cal.json").write_text(calibration.to_json())
+
+    def convert(source: str, output: str, task: str):
+        name = ["--robot-name", f"SYS1 {task}"]
+        return respot("convert", source, "-c", "cal.json", "-o", output, *name, "--keep-config")
+
+    assert convert("SYS1", "one", "T_ROB2").code == 0
+    both = convert("one", "both", "T_ROB1")
+    assert both.code == 0, both.err
+    for folder in ("TASK1", "TASK2"):
+        first, last = (tmp_path / name / f"RAPID/{folder}/PROGMOD/Weld.mod" for name in ("SYS1", "both"))
+        assert first.read_bytes() != last.read_bytes()
+    again = convert("both", "again", "T_ROB1")
+    assert again.code == 2 and "ALREADY_APPLIED" in again.err
+
+
 def test_the_list_of_robots_in_the_message(respot, tmp_path):
     write(tmp_path / "SYS1", MULTIMOVE)
     (tmp_path / "theory.csv").write_text("id,x,y,z\nS1,0,0,0\n")

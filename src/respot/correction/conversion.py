@@ -149,7 +149,7 @@ def convert(
             "to move programs onto another list of spots, give it with --theory"
         )
         raise BadInputError("BAD_OPTION", message)
-    _refuse_recorded(read, model.content_hash)
+    _refuse_recorded(read, _mark(model, read.robot))
     moves = _moves_of(read, ids)
     if not moves:
         detail = f": {read.spots.issues[0]}" if read.spots.issues else ""
@@ -176,8 +176,13 @@ def _applied(source: Source) -> list[str]:
     return [item for item in applied if isinstance(item, str)] if isinstance(applied, list) else []
 
 
-def _refuse_recorded(source: Source, calibration_hash: str) -> None:
-    if calibration_hash in _applied(source):
+def _mark(calibration: Calibration, robot: Robot) -> str:
+    """Return what the record says of a calibration that was applied; of several robots of one controller, to which."""
+    return f"{calibration.content_hash} {robot.task}".rstrip()
+
+
+def _refuse_recorded(source: Source, mark: str) -> None:
+    if mark in _applied(source):
         message = "this calibration was applied to this backup before: start from the original"
         raise BadInputError("ALREADY_APPLIED", message, str(source.path / RECORD))
 
@@ -203,7 +208,7 @@ def record_of(conversion: Conversion) -> dict[str, Any]:
         "source": str(conversion.source.path),
         "source_sha256": conversion.source.sha256,
         "verified": True,
-        "applied": [*_applied(conversion.source), conversion.calibration.content_hash],
+        "applied": [*_applied(conversion.source), _mark(conversion.calibration, correction.robot)],
         "issues": [issue.as_json() for issue in conversion.issues],
         "contents": {path: _sha256(correction.files.get(path, data)) for path, data in files.items()},
         "files": {

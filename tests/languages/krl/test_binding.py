@@ -272,7 +272,7 @@ def test_operands():
     assert world(found[10]) == [998, 1, 503]
     assert found[11].target is found[2].target
     assert found[11].world is None  # shifted by what the program measured
-    assert found[11].codes == ("RUN_TIME_POSE",)
+    assert found[11].codes == ("RUN_TIME_SHIFT",)
     assert found[12].target.kind == "joints"
     assert found[2].target is found[3].target
     np.testing.assert_allclose(found[13].world.translation, [980, 5, 530])  # turned first, then 5 along the new x

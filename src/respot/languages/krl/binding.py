@@ -204,7 +204,7 @@ class Binder:
         unknown = draft.operand.doubt.text if draft.operand.doubt is not None else ""
         if draft.operand.tool_offset is None:  # the target itself can be corrected all the same
             doubts.append(
-                Doubt("RUN_TIME_POSE", f"what shifts {target or draft.instruction} is computed while the robot runs")
+                Doubt("RUN_TIME_SHIFT", f"what shifts {target or draft.instruction} is computed while the robot runs")
             )
         if needs_base:
             doubts += self._doubts(state)

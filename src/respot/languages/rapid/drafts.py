@@ -121,8 +121,11 @@ class Finisher:
         if not joints:
             if target is not None and target.unknown:
                 doubts.append(Doubt("RUN_TIME_POSE", f"{target.name}: {target.unknown}"))
-            if operand.tool_offset is None or (operand.offset is not None and not operand.offset.literal):
-                doubts.append(Doubt("RUN_TIME_POSE", f"what shifts {target or 'it'} is computed while the robot runs"))
+            text = f"what shifts {target or draft.instruction} is computed while the robot runs"
+            if operand.offset is not None and not operand.offset.literal:
+                doubts.append(Doubt("RUN_TIME_POSE", text))
+            elif operand.tool_offset is None:
+                doubts.append(Doubt("RUN_TIME_SHIFT", text))
             if draft.displaced:
                 doubts.append(Doubt("DISPLACED", draft.displaced))
                 unknown = unknown or draft.displaced
