@@ -10,8 +10,9 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from respot.calibration import fit_spots, fit_tables
-from respot.calibration.effects.tool_fit import fit_tool, fit_tool_robust, leave_one_out_tool
+from respot.calibration.effects.tool_fit import fit_tool, leave_one_out_tool
 from respot.calibration.effects.tool_offset import investigate
+from respot.calibration.effects.tool_robust import fit_tool_robust
 from respot.calibration.precision import with_precision
 from respot.calibration.report import report
 from respot.registration.errors import RegistrationError

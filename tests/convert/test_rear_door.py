@@ -219,3 +219,17 @@ def test_a_dry_run_writes_nothing(robot, theory, tmp_path):
     assert code == 0
     assert json.loads(out)["edits"]
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_calibration_of_another_robot_is_refused(tmp_path):
+    """The KUKA's calibration on the ABB: both weld the same spots of the same door, but each has its own deviation."""
+    fitted = CliRunner().invoke(
+        app, ["fit", str(SAMPLES / "kuka"), "--theory", str(SAMPLES / "theory.csv"), "-o", str(tmp_path / "cal.json")]
+    )
+    assert fitted.exit_code == 0
+    result = CliRunner().invoke(
+        app, ["convert", str(SAMPLES / "abb"), "-c", str(tmp_path / "cal.json"), "-o", str(tmp_path / "out")]
+    )
+    assert result.exit_code == 2
+    assert "ANOTHER_ROBOT" in result.stderr and "--any-robot" not in result.stderr
+    assert not (tmp_path / "out").exists()

@@ -13,8 +13,9 @@ from respot.calibration.calibration import Calibration, Frame, Kind
 from respot.calibration.effects import swapped_ids, tool_offset
 from respot.calibration.effects.orientations import OrientationFit, compare_orientations
 from respot.calibration.effects.search import RIGID_ONLY, Effects, effects_of, search_effects
-from respot.calibration.effects.tool_fit import fit_tool_robust, moved_by
+from respot.calibration.effects.tool_fit import moved_by
 from respot.calibration.effects.tool_model import robust_of, uncertainty_of
+from respot.calibration.effects.tool_robust import fit_tool_robust
 from respot.calibration.methods import affine_fit, paper_fit
 from respot.calibration.spot_fit import Method, SpotFit
 from respot.calibration.uncertainty import transform_uncertainty

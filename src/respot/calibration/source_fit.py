@@ -15,6 +15,7 @@ from respot.calibration.effects.search import RIGID_ONLY, Effects
 from respot.calibration.effects.tool_fit import moved_by
 from respot.calibration.fit import fit_tables
 from respot.calibration.spot_fit import Method, SpotFit
+from respot.calibration.stored import robot_identity
 from respot.issues import BadInputError, Issue
 from respot.registration.errors import RegistrationError
 from respot.registration.matching import Matching
@@ -127,6 +128,7 @@ def fit_source(source_path: Path, reference_path: Path, options: FitOptions) -> 
                 "source_sha256": source.sha256,
                 "reference": str(reference_path),
                 "reference_sha256": reference.sha256,
+                **({} if source.robot is None else {"robot": robot_identity(source.robot)}),
             },
         )
     except RegistrationError as error:

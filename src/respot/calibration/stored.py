@@ -35,7 +35,9 @@ def robot_identity(robot: Robot) -> dict[str, str]:
     return {**known, "serial": "" if serial is None or not serial.value.strip(" 0") else serial.value}
 
 
-def source_issues(calibration: Calibration, source: Source, *, any_robot: bool = False) -> list[Issue]:
+def source_issues(
+    calibration: Calibration, source: Source, *, any_robot: bool = False, option: str = "--any-robot"
+) -> list[Issue]:
     """Compare a source with the one that a calibration was fitted to.
 
     Another file is a warning: a new program of the same robot is what predictions are for. Another robot is an error. A
@@ -49,6 +51,8 @@ def source_issues(calibration: Calibration, source: Source, *, any_robot: bool =
         What it is used on.
     any_robot : bool
         Make a warning of the error.
+    option : str
+        What a person may say to get ``any_robot``; empty where nothing does.
 
     Raises
     ------
@@ -63,7 +67,8 @@ def source_issues(calibration: Calibration, source: Source, *, any_robot: bool =
     if difference:
         message = f"the calibration was fitted to another robot: {difference}"
         if not any_robot:
-            advice = "fit one for this robot, or say --any-robot if you know that it is the same"
+            advice = "fit one for this robot"
+            advice += f", or say {option} if you know that it is the same" if option else ""
             raise BadInputError("ANOTHER_ROBOT", f"{message}; {advice}", str(source.path))
         issues.append(Issue("ANOTHER_SOURCE", message, str(source.path)))
     first = calibration.provenance.get("source", "an unnamed source")

@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from respot import __version__
-from respot.calibration.calibration import Calibration, CalibrationError
+from respot.calibration.calibration import Calibration
 from respot.calibration.report import report
 from respot.calibration.source_fit import FitOptions, SourceFit, fit_source
+from respot.calibration.stored import load_calibration, source_issues
 from respot.correction.correction import Correction, align
 from respot.correction.options import CorrectionOptions
 from respot.issues import BadInputError, Issue
@@ -131,9 +132,9 @@ def convert(
         ids: Sequence[str] = fitted.fit.ids
     else:
         assert calibration is not None  # noqa: S101 - the command line asks for one of both
-        fitted, model = None, _load(calibration)
+        fitted, model = None, load_calibration(calibration)
         read = read_source(source, model.ids, fit_options.spot_id, fit_options.robot_name, fit_options.profiles)
-        issues, ids = read.issues, model.ids
+        issues, ids = [*read.issues, *source_issues(model, read, option="")], model.ids
     if read.robot is None:
         raise BadInputError("NO_ROBOT", "is a table: only a backup or a program can be converted", str(source))
     if model.tool_offset is not None:
@@ -190,13 +191,6 @@ def _refuse_recorded(source: Source, mark: str) -> None:
 def _moves_of(source: Source, ids: Sequence[str]) -> list[Move]:
     wanted = set(ids)
     return [move for name, move in zip(source.spots.ids, source.spots.moves, strict=True) if name in wanted]
-
-
-def _load(path: Path) -> Calibration:
-    try:
-        return Calibration.load(path)
-    except CalibrationError as error:
-        raise BadInputError("BAD_CALIBRATION", str(error).removeprefix(f"{path}: "), str(path)) from error
 
 
 def record_of(conversion: Conversion) -> dict[str, Any]:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from respot.calibration.effects import EFFECTS, swapped_ids, tool_offset
-from respot.calibration.effects.tool_fit import fit_tool_robust
 from respot.calibration.effects.tool_offset import ToolTrial
+from respot.calibration.effects.tool_robust import fit_tool_robust
 from respot.registration.errors import RegistrationError
 from respot.registration.exchanged import ExchangeResult, find_exchanged
 from respot.registration.robust import fit_robust

@@ -21,13 +21,12 @@ from respot.calibration.effects.effect import Effect, Remedy, Rival
 from respot.calibration.effects.tool_fit import (
     LEAST_SPOTS,
     ToolFit,
-    canonical_order,
-    fit_tool_robust,
     leave_one_out_tool,
     leave_out,
     rigid_split,
     undetermined_text,
 )
+from respot.calibration.effects.tool_robust import canonical_order, fit_tool_robust
 from respot.registration.covariance import jacobian
 from respot.registration.errors import RegistrationError
 from respot.registration.leave_one_out import leave_one_out
