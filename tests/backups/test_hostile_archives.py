@@ -98,12 +98,18 @@ HOSTILE = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("command", ["inspect", "fit", "convert", "check"])
-@pytest.mark.parametrize("trap", HOSTILE)
+#: In an archive without files no file fails its check.
+EVERY = [
+    (trap, command)
+    for trap in HOSTILE
+    for command in ("inspect", "fit", "convert", "check")
+    if (trap, command) != ("nothing_in_it", "check")
+]
+
+
+@pytest.mark.parametrize(("trap", "command"), EVERY)
 def test_hostile_archive(respot, tmp_path, trap, command):
     data, code, word = HOSTILE[trap]
-    if command == "check" and trap == "nothing_in_it":
-        pytest.skip("an archive without files has no file that fails")
     (tmp_path / "evil.zip").write_bytes(data)
     (tmp_path / "theory.csv").write_text("id,x,y,z\nS1,0,0,0\nS2,9,0,0\nS3,0,9,0\nS4,0,0,9\n")
     before = sorted(tmp_path.rglob("*"))

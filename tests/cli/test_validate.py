@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import csv
 from pathlib import Path
 
@@ -96,8 +97,9 @@ def test_names_that_do_not_meet(respot, stored, fresh, tmp_path):
 
 
 def test_another_robot_is_refused(respot, stored, fresh):
-    text = stored.read_text().replace('"source_sha256": "', '"robot": {"serial": "7"}, "source_sha256": "f')
-    stored.write_text(text)
+    record = json.loads(stored.read_text())
+    record["provenance"] |= {"robot": {"serial": "7", "model": "KR 16"}, "source_sha256": "f" * 64}
+    stored.write_text(json.dumps(record))
     result = respot("validate", SAMPLES / "kuka", "--theory", fresh, "-c", stored)
     assert (result.code, "ANOTHER_ROBOT" in result.err) == (2, True)
     assert respot("validate", SAMPLES / "kuka", "--theory", fresh, "-c", stored, "--any-robot").code == 0
