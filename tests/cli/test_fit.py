@@ -83,8 +83,12 @@ def test_transform_is_proper_and_carries_its_uncertainty(fitted):
     assert np.linalg.det(rotation) > 0
     covariance = np.array(fitted["transform"]["covariance"])
     assert covariance.shape == (6, 6)
-    # residuals of the 14 spots over 3n - 6 degrees of freedom: sigma 3.22 mm, and sigma / sqrt(14) for the centre
-    assert np.sqrt(covariance[0, 0]) == pytest.approx(5.16311 * np.sqrt(14 / 36) / np.sqrt(14), rel=1e-3)
+    assert fitted["noise_directions"]["intervals_by_direction"] is True
+    assert fitted["noise_directions"]["isotropy_p"] < 0.01
+    # each direction by itself: sum of squares over n - 2, and that over sqrt(14) for the centre
+    for row, name in enumerate(("dx", "dy", "dz")):
+        square = sum(spot[name] ** 2 for spot in fitted["spots"])
+        assert np.sqrt(covariance[row, row]) == pytest.approx(np.sqrt(square / 12 / 14), rel=1e-3)
 
 
 def test_a_source_table_gives_the_same(respot, theory, fitted):

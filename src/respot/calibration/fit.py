@@ -18,9 +18,10 @@ from respot.calibration.effects.tool_model import robust_of, uncertainty_of
 from respot.calibration.effects.tool_robust import fit_tool_robust
 from respot.calibration.methods import affine_fit, paper_fit
 from respot.calibration.spot_fit import Method, SpotFit
-from respot.calibration.uncertainty import transform_uncertainty
+from respot.calibration.uncertainty import transform_uncertainty, uncertainty_by_direction
 from respot.registration.affine import fit_affine
 from respot.registration.alternatives import fit_translation
+from respot.registration.anisotropy import isotropy_p_value
 from respot.registration.congruence import congruence
 from respot.registration.errors import DegenerateError, RegistrationError
 from respot.registration.exchanged import ExchangeResult
@@ -36,6 +37,8 @@ Array = NDArray[np.float64]
 
 LEAST_PAIRS = 4
 DEFAULT_FRAME: Mapping[Kind, Frame] = {"theory": "same", "measured": "free"}
+LEAST_FOR_DIRECTIONS = 8
+"""Fewer residuals do not tell the noise of three directions."""
 LATERAL_NOISE = 3.0
 """Spots must stray from their best line by this many times the noise (RMS), or the turn about it is noise alone."""
 
@@ -226,7 +229,11 @@ def fit_spots(
         robust, moved = exchanged.robust, first
         inliers = robust.inliers
         calibrated = robust.rigid.predict(first)
-        uncertainty = transform_uncertainty(calibrated[inliers], robust.rigid.residuals[inliers])
+        points, left = calibrated[inliers], robust.rigid.residuals[inliers]
+        uncertainty = transform_uncertainty(points, left)
+        if len(points) >= LEAST_FOR_DIRECTIONS:
+            alike = isotropy_p_value(first[inliers], repaired[inliers], seed=seed)
+            uncertainty = uncertainty_by_direction(uncertainty, points, left, alike)
         after_loo = leave_one_out(first, repaired, inliers)
     else:
         assert trial is not None  # noqa: S101 - it has the fit

@@ -78,6 +78,10 @@ def _report(fit: SpotFit) -> dict[str, Any]:
             for axis, sd in zip(fit.directions.axes, fit.directions.sd, strict=True)
         ],
         "residual_sd_xyz": fit.directions.sd_xyz.tolist(),
+        "noise_directions": {
+            "isotropy_p": fit.uncertainty.isotropy_p,
+            "intervals_by_direction": fit.uncertainty.by_direction,
+        },
         "effects": [effect.to_dict() for effect in fit.effects],
         "effects_tried": [] if fit.tool is None else [fit.tool.to_dict()],
         "orientations": None if fit.orientations is None else fit.orientations.to_dict(),

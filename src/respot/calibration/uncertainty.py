@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from respot.registration.anisotropy import plain_covariance
 from respot.registration.covariance import unit_covariance
 
 Array = NDArray[np.float64]
@@ -34,6 +35,10 @@ class TransformUncertainty:
         3n - 6.
     half_width : (6,) array
         Half of each 95 % interval, by Student's t [mm, deg].
+    isotropy_p : float or None
+        Chance of residuals as uneven as these under noise that is the same along all axes; None where not asked for.
+    by_direction : bool
+        The covariance takes the noise of each direction by itself; ``sigma`` stays the mean over the directions.
     """
 
     covariance: Array
@@ -41,6 +46,44 @@ class TransformUncertainty:
     sigma: float
     degrees_of_freedom: int
     half_width: Array
+    isotropy_p: float | None = None
+    by_direction: bool = False
+
+
+UNEVEN = 0.01
+"""Below this chance the noise is taken not to be the same along all axes."""
+
+
+def uncertainty_by_direction(
+    plain: TransformUncertainty, points: Array, residuals: Array, isotropy_p: float
+) -> TransformUncertainty:
+    """Take the noise of each direction by itself, where the residuals show that it is not the same along all axes.
+
+    The transform is still plain least squares; its covariance is ``(J'J)^-1 J' S J (J'J)^-1`` with the covariance S of
+    one residual vector, and Student's t has n - 2 degrees of freedom.
+
+    Parameters
+    ----------
+    plain : TransformUncertainty
+        For noise that is the same along all axes.
+    points, residuals : (n, 3) arrays
+        Calibrated inliers and their residuals [mm].
+    isotropy_p : float
+        Of `respot.registration.anisotropy.isotropy_p_value`.
+    """
+    if isotropy_p >= UNEVEN:
+        return replace(plain, isotropy_p=isotropy_p)
+    free = len(points) - 2
+    units = np.array([1.0, 1.0, 1.0, 180.0 / np.pi, 180.0 / np.pi, 180.0 / np.pi])
+    covariance = plain_covariance(points, residuals.T @ residuals / free) * np.outer(units, units)
+    return replace(
+        plain,
+        covariance=covariance,
+        half_width=float(stats.t.ppf(0.975, free)) * np.sqrt(np.diag(covariance)),
+        degrees_of_freedom=free,
+        isotropy_p=isotropy_p,
+        by_direction=True,
+    )
 
 
 def transform_uncertainty(points: Array, residuals: Array, fitted: Array | None = None) -> TransformUncertainty:

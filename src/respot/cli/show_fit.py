@@ -151,6 +151,12 @@ def _show_found(fit: SpotFit) -> None:
         line(f"  tool_offset was tried and is not part of the model: {trial.verdict}")
     if fit.orientations is not None:
         line(f"  {fit.orientations.verdict}")
+    sure = fit.uncertainty
+    if sure.by_direction and sure.isotropy_p is not None:
+        line(
+            f"  the noise is not the same along all axes (p = {sure.isotropy_p:.3f}): the intervals above take each "
+            "direction by itself"
+        )
     sd = fit.directions.sd_xyz
     axis = fit.directions.axes[int(np.argmax(fit.directions.sd))]
     along = "xyz"[int(np.argmax(np.abs(axis)))]
