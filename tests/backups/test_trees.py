@@ -192,7 +192,11 @@ def test_files_that_only_look_like_programs_make_no_robot(tmp_path):
         ({"Program/a.src": src("a"), "Mada/$machine.dat": MACHINE}, {"$config.dat"}),
         ({"Program/a.src": src("a")}, {"$config.dat", "$machine.dat"}),
         (krc("ST20R01"), set()),
-        ({"RAPID/TASK1/PROGMOD/A.mod": module("A")}, {"moc.cfg", "sys.cfg", "backinfo.txt"}),
+        ({"RAPID/TASK1/PROGMOD/A.mod": module("A")}, {"moc.cfg", "backinfo.txt"}),
+        (
+            {"RAPID/TASK1/PROGMOD/A.mod": module("A"), "RAPID/TASK2/PROGMOD/B.mod": module("B")},
+            {"moc.cfg", "sys.cfg", "backinfo.txt"},
+        ),
         ({**MULTIMOVE, "SYSPAR/MOC.cfg": "", "HOME/moc.cfg": ""}, set()),
         ({k: v for k, v in MULTIMOVE.items() if "MOC" not in k} | {"HOME/moc.cfg": ""}, {"moc.cfg"}),
     ],
