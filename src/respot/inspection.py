@@ -303,18 +303,15 @@ def _configured(target: Target) -> Record:
 
 def _relative(move: Move) -> Record:
     """A motion away from the last position, or to joints that the backup does not hold."""
-    return {
-        "instruction": move.instruction,
-        "program": move.program,
-        "routine": move.routine,
-        "path": move.path,
-        "line": move.line,
-        "offset": _shift(move),
-        "codes": list(move.codes),
-    }
+    return {**_motion(move), "offset": _shift(move)}
 
 
 def _unresolved(move: Move) -> Record:
+    """A motion whose goal is not known before the robot runs."""
+    return {**_motion(move), "reason": move.unknown}
+
+
+def _motion(move: Move) -> Record:
     return {
         "instruction": move.instruction,
         "program": move.program,
@@ -322,7 +319,6 @@ def _unresolved(move: Move) -> Record:
         "path": move.path,
         "line": move.line,
         "codes": list(move.codes),
-        "reason": move.unknown,
     }
 
 

@@ -474,3 +474,13 @@ def test_a_kept_target_of_a_partial_correction_makes_transitions(tmp_path):
     data = krl_point("P8", 5, 6, 7, ",S 2,T 2") + fdat("P8") + krl_point("P9", 1, 2, 3) + fdat("P9")
     done = convert(tmp_path, krl(body=lin("P8") + lin("P9"), data=data), "--partial")
     assert {("XS4", "XP8"), ("XP8", "XP9")} <= {(t["from"], t["to"]) for t in done.record["transitions"]}
+
+
+def test_a_target_that_is_first_used_with_a_computed_shift_is_judged_by_itself(tmp_path):
+    """Far outside of the spots, and where its first motion goes is not known: it moves, and is flagged all the same."""
+    body = "SH=$POS_ACT\n" + lin("P1", "XP1:SH") + lin("P1")
+    done = convert(tmp_path, krl(body=body, data="DECL FRAME SH\n" + krl_point("P1", 900, 0, 0) + fdat("P1")))
+    assert done.code == 0, done.err
+    assert "XP1" in done.edited()
+    (message,) = [issue["message"] for issue in done.record["issues"] if issue["code"] == "EXTRAPOLATED"]
+    assert "XP1" in message

@@ -8,10 +8,10 @@ from fnmatch import fnmatchcase
 from itertools import pairwise
 
 import numpy as np
-from scipy.spatial import Delaunay, QhullError
 from scipy.spatial.transform import RigidTransform
 
 from respot import __version__
+from respot.calibration.region import outside
 from respot.correction.configuration import configure
 from respot.correction.options import CorrectionOptions
 from respot.correction.points import (
@@ -26,7 +26,7 @@ from respot.correction.points import (
 from respot.correction.preflight import Checked, Preflight
 from respot.correction.scope import Moving, Refusal, Scope, Stay, find_scope
 from respot.correction.sequence import sequences
-from respot.geometry import Array, distance_mm, turn_deg
+from respot.geometry import distance_mm, turn_deg
 from respot.issues import BadInputError, Issue
 from respot.kinematics.cell import Reason, RobotCell
 from respot.kinematics.from_backup import cell_of
@@ -373,26 +373,19 @@ def _issues(
 def _extrapolated(moving: Sequence[Moving], spot_moves: Sequence[Move]) -> list[Issue]:
     """One issue for all moved targets outside the hull of the fitted spots."""
     spots = np.array([pose.translation for move in spot_moves if (pose := move.spot_pose) is not None]).reshape(-1, 3)
-    poses = [pose for item in moving if (pose := item.moves[0].spot_pose) is not None]
-    points = np.array([pose.translation for pose in poses]).reshape(-1, 3)
+    # the target itself: where a motion shifts it to may be known only while the robot runs
+    places = [item.base2spots * item.target.pose for item in moving if item.target.pose is not None]
+    points = np.array([place.translation for place in places]).reshape(-1, 3)
     if not len(points) or not len(spots):
         return []
-    outside = ~_inside(spots, points)
-    if not outside.any():
+    beyond = outside(spots, points)
+    if not beyond.any():
         return []
-    nearest = np.linalg.norm(points[outside][:, None, :] - spots[None, :, :], axis=2).min(axis=1)
-    names = [item.target.name for item, out in zip(moving, outside, strict=True) if out]
+    nearest = np.linalg.norm(points[beyond][:, None, :] - spots[None, :, :], axis=2).min(axis=1)
+    names = [item.target.name for item, out in zip(moving, beyond, strict=True) if out]
     farthest = names[int(nearest.argmax())]
     message = (
-        f"{int(outside.sum())} of {len(points)} moved targets lie outside the hull of the {len(spots)} fitted spots; "
+        f"{int(beyond.sum())} of {len(points)} moved targets lie outside the hull of the {len(spots)} fitted spots; "
         f"the farthest is {farthest}, {float(nearest.max()):.0f} mm from the nearest spot"
     )
     return [Issue("EXTRAPOLATED", message)]
-
-
-def _inside(spots: Array, points: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    own = (points[:, None, :] == spots[None, :, :]).all(axis=2).any(axis=1)
-    try:
-        return np.asarray(own | (Delaunay(spots).find_simplex(points) >= 0))
-    except QhullError:
-        return np.asarray(own)
