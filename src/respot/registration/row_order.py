@@ -20,7 +20,11 @@ def own_order(source: Array, reference: Array) -> NDArray[np.intp]:
     source, reference : (n, 3) arrays [mm]
     """
     middles = source.mean(axis=0), reference.mean(axis=0)
-    apart = np.linalg.norm(source - middles[0], axis=1), np.linalg.norm(reference - middles[1], axis=1)
-    keys = (*reference.T, *source.T, np.round(apart[1], _DECIMALS), np.round(apart[0], _DECIMALS))
-    order: NDArray[np.intp] = np.lexsort(keys)
+    near, far = (
+        np.round(np.linalg.norm(points - middle, axis=1), _DECIMALS)
+        for points, middle in zip((source, reference), middles, strict=True)
+    )
+    order: NDArray[np.intp] = np.argsort(near, kind="stable")
+    if (np.diff(near[order]) == 0.0).any():  # rarely: the other keys cost as much each
+        order = np.lexsort((*reference.T, *source.T, far, near))
     return order
