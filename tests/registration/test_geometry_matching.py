@@ -171,3 +171,27 @@ def test_too_few_and_too_many():
     spots = body(np.random.default_rng(59), 14, "box")
     assert code_of(spots[:3], spots) == "TOO_FEW_PAIRS"
     assert code_of(np.zeros((2001, 3)), spots) == "TOO_MANY_SPOTS"
+
+
+@pytest.mark.parametrize("kind", ["box", "panel"])
+def test_long_lists_are_looked_up_in_cells_and_matched_as_well(points, kind):
+    rng = np.random.default_rng(60)
+    source, reference, truth = lists(points, rng, 300, kind, 2.0)
+    best = match_by_geometry(source, reference).best
+    assert np.mean(truth[best.source_rows] == best.reference_rows) > 0.95
+    assert len(best.source_rows) >= 200
+
+
+@pytest.mark.parametrize("far", [1e6, 1e12])
+def test_one_spot_far_off_hides_nothing(points, far):
+    """Cells over its distance would hold the whole part."""
+    source, reference, truth = lists(points, np.random.default_rng(61), 120, "box", 1.0)
+    strangers = np.flatnonzero(~np.isin(np.arange(120), truth))
+    reference[strangers[0]] += [far, far, far]
+    best = match_by_geometry(source, reference).best
+    assert np.mean(truth[best.source_rows] == best.reference_rows) > 0.95
+
+
+def test_long_lists_of_different_parts_are_never_matched():
+    rng = np.random.default_rng(62)
+    assert code_of(body(rng, 150, "box"), body(rng, 150, "box")) == "NOT_CONGRUENT"

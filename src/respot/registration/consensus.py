@@ -12,8 +12,9 @@ from math import ceil, comb
 import numpy as np
 from numpy.typing import NDArray
 
-from respot.registration.rigid import rotations_from_covariance, transform_of
+from respot.registration.rigid import rotations_from_covariance
 from respot.registration.row_order import own_order
+from respot.registration.triples import transforms_of_triples
 
 Array = NDArray[np.float64]
 
@@ -21,7 +22,6 @@ TRIALS = 1000  # half of the pairs wrong: the chance to miss three good ones 100
 _KEPT, _STEPS, _SCORED_ROWS = 5, 3, 2000
 _FIRST_LOOK = 250  # rows that choose which trials are sharpened: enough to tell a good triple from a wild one
 _BLOCK = 250_000  # multiplications of one product: more, and linear algebra libraries spread it over threads, at a loss
-_FLAT = 1e-9  # of a triangle's area over its sides' squares: below, rounding decides how it is turned
 
 
 def quota_of(n: int) -> int:
@@ -54,7 +54,7 @@ def consensus_transform(source: Array, reference: Array, *, seed: int, trials: i
         triples = np.array(list(combinations(range(n), 3)))
     else:
         triples = np.argsort(rng.random((trials, n)), axis=1)[:, :3] if n <= 50 else _distinct(rng, n, trials)
-    rotations, translations = _lay_triples(source, reference, triples)
+    rotations, translations = transforms_of_triples(source[triples], reference[triples])
     first = products if n <= _FIRST_LOOK else products.some(rng.choice(n, _FIRST_LOOK, replace=False))
     enough = quota_of(min(n, _FIRST_LOOK)) - 1
     best = np.argsort(np.partition(first.squares(rotations, translations), enough, axis=1)[:, enough], kind="stable")
@@ -66,43 +66,6 @@ def consensus_transform(source: Array, reference: Array, *, seed: int, trials: i
     winner = int(np.argmin(np.partition(squares, quota - 1, axis=1)[:, :quota].sum(axis=1)))
     rotation: Array = rotations[winner]
     return rotation, translations[winner] + origins[1] - rotation @ origins[0]
-
-
-def _lay_triples(source: Array, reference: Array, triples: NDArray[np.intp]) -> tuple[Array, Array]:
-    """Least-squares transforms (b, 3, 3) and (b, 3) of triples of rows (b, 3), as `transform_of` has them.
-
-    A triangle is laid in the plane of the other, its way round kept, and turned there by the best angle: what the
-    singular values come to for three pairs, in closed form. Where a triangle is a line the singular values decide.
-    """
-    corners = np.stack([source[triples], reference[triples]])  # (2, b, 3, 3)
-    means = corners.mean(axis=2)
-    offsets = corners - means[:, :, None, :]
-    one, two = corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0]
-    normals = _cross(one, two)
-    size = np.sqrt(np.einsum("sbk,sbk->sb", one, one))
-    area = np.sqrt(np.einsum("sbk,sbk->sb", normals, normals))
-    if (area <= _FLAT * (size**2 + np.einsum("sbk,sbk->sb", two, two))).any():
-        return transform_of(corners[0], corners[1])
-    normals /= area[:, :, None]
-    along = one / size[:, :, None]
-    across = _cross(normals, along)
-    frames = np.stack([along, across, normals], axis=2)  # rows: the axes of either triangle
-    plane = offsets @ np.swapaxes(frames[:, :, :2], 2, 3)  # (2, b, 3 corners, 2)
-    products = np.einsum("bci,bcj->bij", plane[0], plane[1])
-    angle = np.arctan2(products[:, 0, 1] - products[:, 1, 0], products[:, 0, 0] + products[:, 1, 1])
-    cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
-    turned = frames[1].copy()
-    turned[:, 0] = cosine * frames[1][:, 0] + sine * frames[1][:, 1]
-    turned[:, 1] = cosine * frames[1][:, 1] - sine * frames[1][:, 0]
-    rotations = np.swapaxes(turned, 1, 2) @ frames[0]
-    return rotations, means[1] - np.einsum("bij,bj->bi", rotations, means[0])
-
-
-def _cross(one: Array, two: Array) -> Array:
-    """Cross products of vectors (..., 3); `numpy.cross` takes several times as long for few."""
-    x, y, z = np.moveaxis(one, -1, 0)
-    u, v, w = np.moveaxis(two, -1, 0)
-    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-1)
 
 
 def _distinct(rng: np.random.Generator, n: int, trials: int) -> NDArray[np.intp]:

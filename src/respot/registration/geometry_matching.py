@@ -17,12 +17,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
-from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
 
 from respot.registration.congruence import distances_between
 from respot.registration.errors import RegistrationError
+from respot.registration.nearest import NearestSpots
 from respot.registration.rigid import transform_of
 from respot.registration.robust import INLIER_CHI, robust_scale
+from respot.registration.triples import transforms_of_triples
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -41,7 +43,8 @@ MOST_BY_CHANCE = 0.05
 MOST_SPOTS = 2000
 _SIDE = 35.0  # two sides of a triple agree up to this [mm]
 _TRIPLES, _LEAST_TRIPLES = 25, 8  # with 30 % of the spots lost all 25 miss three in 100,000 times
-_MOST_CANDIDATES, _SETTLED, _FIRST_LOOK = 20_000, 8, 12
+_MOST_CANDIDATES, _LOOKED_AT, _SETTLED, _FIRST_LOOK = 20_000, 400, 8, 12
+_ROUGHLY = 100  # source spots beyond which distances to the nearest reference spot are looked up in cells first
 _COMPLETE = 0.9  # a match of this share of the shorter list is not the other hand of the part
 _SHIFTS = 15
 _QUICK = 200  # spots of both lists up to which the other hand is always tried
@@ -213,14 +216,13 @@ def _search(
     source: Array, reference: Array, same_frame: bool, rng: np.random.Generator, triples: int = _TRIPLES
 ) -> GeometryMatch | None:
     """Lay triples on the reference until one placement holds most of the spots; then some of its own, for rivals."""
-    tree = cKDTree(reference)
-    between = distances_between(reference)
+    places = NearestSpots(reference, REACH, roughly=len(source) > _ROUGHLY)
     shorter = min(len(source), len(reference))
     kept: list[Placement] = []
     tried = laid = 0
     for _ in range(triples):
         triple = _wide_triple(source, np.arange(len(source), dtype=np.intp), rng)
-        placements, count = _lay(source, reference, between, tree, triple, same_frame)
+        placements, count = _lay(source, places, triple, same_frame)
         kept = _best(kept + placements)
         tried, laid = tried + 1, laid + count
         if tried >= _LEAST_TRIPLES and kept and kept[0].support >= _ENOUGH * shorter:
@@ -230,7 +232,7 @@ def _search(
     for _ in range(_LEAST_TRIPLES // 2):
         if len(kept[0].source_rows) >= 3:
             triple = _wide_triple(source, kept[0].source_rows, rng)
-            kept = _best(kept + _lay(source, reference, between, tree, triple, same_frame)[0])
+            kept = _best(kept + _lay(source, places, triple, same_frame)[0])
     return _decide(source, reference, kept, laid / tried, rng)
 
 
@@ -243,71 +245,65 @@ def _wide_triple(source: Array, rows: Rows, rng: np.random.Generator) -> Rows:
     return np.asarray(triples[int(np.argmax(areas))], dtype=np.intp)
 
 
-def _lay(
-    source: Array, reference: Array, between: Array, tree: cKDTree, triple: Rows, same_frame: bool
-) -> tuple[list[Placement], int]:
+def _lay(source: Array, places: NearestSpots, triple: Rows, same_frame: bool) -> tuple[list[Placement], int]:
     """Lay one triple of the source on triples of the reference: the best placements, and how many there were."""
-    candidates = _triples_like(between, distances_between(source[triple]))
+    candidates = _triples_like(places.between, distances_between(source[triple]))
     if not len(candidates):
         return [], 0
-    rotations, translations = transform_of(
-        np.broadcast_to(source[triple], (len(candidates), 3, 3)), reference[candidates]
+    rotations, translations = transforms_of_triples(
+        np.broadcast_to(source[triple], (len(candidates), 3, 3)), places.spots[candidates]
     )
     if same_frame:
-        near = np.trace(rotations, axis1=1, axis2=2) >= 1.0 + 2.0 * np.cos(np.radians(SAME_FRAME_TURN))
-        rotations, translations = rotations[near], translations[near]
+        upright = np.trace(rotations, axis1=1, axis2=2) >= 1.0 + 2.0 * np.cos(np.radians(SAME_FRAME_TURN))
+        rotations, translations = rotations[upright], translations[upright]
         if not len(rotations):
             return [], 0
     count = len(rotations)
-    look = source[np.linspace(0, len(source) - 1, min(_FIRST_LOOK, len(source))).astype(int)]
-    first = np.argsort(-_support(look, rotations, translations, tree), kind="stable")[: 50 * _SETTLED]
-    rotations, translations = rotations[first], translations[first]
-    full = _support(source, rotations, translations, tree)
+    if count > _LOOKED_AT:
+        look = source[np.linspace(0, len(source) - 1, min(_FIRST_LOOK, len(source))).astype(int)]
+        first = np.argsort(-_support(look, rotations, translations, places), kind="stable")[:_LOOKED_AT]
+        rotations, translations = rotations[first], translations[first]
+    full = _support(source, rotations, translations, places)
     placements: list[Placement] = []
     for row in np.argsort(-full, kind="stable")[: 3 * _SETTLED]:
-        placement = _near(source, tree, rotations[row], translations[row])
+        placement = _near(source, places, rotations[row], translations[row])
         if all(_different(placement, other) for other in placements):
-            placements.append(_approach(source, reference, tree, placement))
+            placements.append(_approach(source, places, placement))
     return placements, count
 
 
 def _triples_like(between: Array, sides: Array) -> Rows:
     """Triples of the reference with the sides of one triangle (3, 3), the most alike if there are very many; (t, 3)."""
+    second, third = np.abs(between - sides[0, 2]) <= _SIDE, np.abs(between - sides[1, 2]) <= _SIDE
     i, j = np.nonzero(np.abs(between - sides[0, 1]) <= _SIDE)
     i, j = i[i != j], j[i != j]
     misfits, found = [], []
     for start in range(0, len(i), 2000):
         one, two = i[start : start + 2000], j[start : start + 2000]
-        third, fourth = np.abs(between[one] - sides[0, 2]), np.abs(between[two] - sides[1, 2])
-        row, k = np.nonzero((third <= _SIDE) & (fourth <= _SIDE))
+        row, k = np.nonzero(second[one] & third[two])
         one, two = one[row], two[row]
         apart = (k != one) & (k != two)
-        row, k, one, two = row[apart], k[apart], one[apart], two[apart]
+        k, one, two = k[apart], one[apart], two[apart]
         found.append(np.stack([one, two, k], axis=1))
-        misfits.append((between[one, two] - sides[0, 1]) ** 2 + third[row, k] ** 2 + fourth[row, k] ** 2)
+        misses = between[one, two] - sides[0, 1], between[one, k] - sides[0, 2], between[two, k] - sides[1, 2]
+        misfits.append(misses[0] ** 2 + misses[1] ** 2 + misses[2] ** 2)
     if not found:
         return np.empty((0, 3), dtype=np.intp)
     order = np.argsort(np.concatenate(misfits), kind="stable")[:_MOST_CANDIDATES]
     return np.asarray(np.concatenate(found)[order], dtype=np.intp)
 
 
-def _support(points: Array, rotations: Array, translations: Array, tree: cKDTree) -> Array:
+def _support(points: Array, rotations: Array, translations: Array, places: NearestSpots) -> Array:
     """Support of placements (b,), each spot by its nearest reference spot within `REACH`."""
-    images = np.einsum("bij,nj->bni", rotations, points) + translations[:, None]
-    lengths, _ = _nearest(tree, images.reshape(-1, 3))
-    support: Array = np.clip(1.0 - (lengths.reshape(images.shape[:2]) / REACH) ** 2, 0.0, None).sum(axis=1)
+    images = points @ np.swapaxes(rotations, 1, 2) + translations[:, None]
+    lengths = places.rough_lengths(images.reshape(-1, 3)).reshape(images.shape[:2])
+    support: Array = np.clip(1.0 - (lengths / REACH) ** 2, 0.0, None).sum(axis=1)
     return support
 
 
-def _nearest(tree: cKDTree, points: Array) -> tuple[Array, Rows]:
-    """Distance and row of the nearest reference spot within `REACH`; infinite where there is none."""
-    lengths, rows = tree.query(points, distance_upper_bound=REACH)
-    return np.asarray(lengths, dtype=np.float64), np.asarray(rows, dtype=np.intp)
-
-
-def _near(source: Array, tree: cKDTree, rotation: Array, translation: Array) -> Placement:
+def _near(source: Array, places: NearestSpots, rotation: Array, translation: Array) -> Placement:
     """Pair every spot with its nearest reference spot within `REACH`, each reference spot once."""
-    lengths, columns = _nearest(tree, source @ rotation.T + translation)
+    lengths, columns = places.of(source @ rotation.T + translation)
     rows = np.flatnonzero(np.isfinite(lengths))
     rows = rows[np.argsort(lengths[rows], kind="stable")]
     _, first = np.unique(columns[rows], return_index=True)
@@ -316,13 +312,13 @@ def _near(source: Array, tree: cKDTree, rotation: Array, translation: Array) -> 
     return Placement(rotation, translation, rows, columns[rows], lengths[rows], support)
 
 
-def _approach(source: Array, reference: Array, tree: cKDTree, placement: Placement) -> Placement:
+def _approach(source: Array, places: NearestSpots, placement: Placement) -> Placement:
     """A few steps of least squares over the nearest spots: quick, and near enough to be compared."""
     for _ in range(5):
         if len(placement.source_rows) < 3:
             break
-        moved = transform_of(source[placement.source_rows], reference[placement.reference_rows])
-        after = _near(source, tree, *moved)
+        moved = transform_of(source[placement.source_rows], places.spots[placement.reference_rows])
+        after = _near(source, places, *moved)
         if after.support <= placement.support:
             break
         placement = after
@@ -348,7 +344,7 @@ def _settle(source: Array, reference: Array, rotation: Array, translation: Array
 
 def _pair(source: Array, reference: Array, rotation: Array, translation: Array, limit: float) -> Placement:
     images = source @ rotation.T + translation
-    squares = np.sum((images[:, None, :] - reference[None, :, :]) ** 2, axis=-1)
+    squares = cdist(images, reference, "sqeuclidean")
     near = squares <= limit**2
     rows, columns = np.flatnonzero(near.any(axis=1)), np.flatnonzero(near.any(axis=0))
     cost = np.minimum(squares[np.ix_(rows, columns)], limit**2)
@@ -437,7 +433,7 @@ def _hit_rate(reference: Array, limit: float, rng: np.random.Generator) -> float
     """
     one, two = rng.integers(0, len(reference), (2, 2000))
     places = reference[one] + rng.random((2000, 1)) * (reference[two] - reference[one])
-    squares = np.sum((places[:, None, :] - reference[None, :, :]) ** 2, axis=-1)
+    squares = cdist(places, reference, "sqeuclidean")
     squares[np.arange(2000), one] = np.inf
     squares[np.arange(2000), two] = np.inf
     return float(np.mean(squares.min(axis=1) <= limit**2))
@@ -445,6 +441,6 @@ def _hit_rate(reference: Array, limit: float, rng: np.random.Generator) -> float
 
 def _doubtful(source: Array, reference: Array, best: Placement, limit: float) -> tuple[int, ...]:
     images = source @ best.rotation.T + best.translation
-    near = np.sum((images[:, None, :] - reference[None, :, :]) ** 2, axis=-1) <= limit**2
+    near = cdist(images, reference, "sqeuclidean") <= limit**2
     crowded = (near.sum(axis=1)[best.source_rows] > 1) | (near.sum(axis=0)[best.reference_rows] > 1)
     return tuple(int(row) for row in best.source_rows[crowded])
