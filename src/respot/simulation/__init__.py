@@ -1,0 +1,7 @@
+"""Lines with hidden effects, to try the engine on. Imports nothing of it: the two cannot agree by construction."""
+
+from respot.simulation.effects import EFFECTS, OUTSIDE
+from respot.simulation.line import LAYOUTS, Line, simulate
+from respot.simulation.robots import ROBOTS
+
+__all__ = ["EFFECTS", "LAYOUTS", "OUTSIDE", "ROBOTS", "Line", "simulate"]
