@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
 from respot.registration.errors import RegistrationError
+from respot.tables.table import Table
 
 Array = NDArray[np.float64]
 
@@ -94,3 +95,14 @@ def noise_from_repeats(ids: Sequence[str], positions: ArrayLike) -> Repeats:
         return Repeats(tuple(first.values()), means, counts, None, 0, None)
     squares = np.sum((points - means[rows]) ** 2, axis=0) / over
     return Repeats(tuple(first.values()), means, counts, float(np.sqrt(squares.mean())), 3 * over, np.sqrt(squares))
+
+
+def noise_of_table(table: Table) -> Repeats | None:
+    """Return what the repeats of a table say about the noise; None where no position stands in several rows.
+
+    The table's own positions are the means, so that the noise of a spot that is fitted is `Repeats.sigma_of_mean`.
+    """
+    every = table.repeats
+    if every is None or every.positions is None:
+        return None
+    return noise_from_repeats(every.ids, every.positions)

@@ -88,11 +88,16 @@ class Title:
     turn: bool = False
 
 
+def plain_word(title: str) -> str:
+    """Return a title without case, blanks and separators, as aliases are written."""
+    return re.sub(r"[\s._\-/:#'°]", "", title.casefold().replace("ß", "ss"))
+
+
 def read_title(cell: Cell) -> Title:
     """Return what a header cell means."""
     text = " ".join(text_of(cell).split())
     plain, unit = split_title(text)
-    word = re.sub(r"[\s._\-/:#'°]", "", plain.casefold().replace("ß", "ss"))
+    word = plain_word(plain)
     if word in _RANK and unit is None:
         return Title("id", text, rank=_RANK[word])
     if word in _CANONICAL:

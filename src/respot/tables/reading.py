@@ -16,6 +16,7 @@ from respot.tables.csv_file import read_csv
 from respot.tables.grid import LARGEST_TABLE, Cell, DateText, Formula, Grid, Quoted, Row, text_of
 from respot.tables.process_simulate import fill_names, fill_positions, frame_header, weld_rows
 from respot.tables.quantities import JOINT, Quantities, is_quantity
+from respot.tables.repeats import merge_repeats, repeat_columns
 from respot.tables.table import Table
 from respot.tables.units import Said, kind_of, unit_of, units_said
 from respot.tables.xlsx_file import read_xlsx
@@ -35,7 +36,9 @@ def read_table(path: Path, pose_needed: bool = True) -> Table:
 
     CSV (``,`` ``;`` tab or ``|``; UTF-8, UTF-16 or Windows-1252) or XLSX with a header row, below any title lines.
     Columns are found by alias in English and German; lengths in other units become mm and angles degrees, and an issue
-    says so. Rows that start with ``#`` are comments. Process Simulate's point and frame lists are read as they are.
+    says so. Rows of one ID that a column ``repeat`` (``run``, ``shot``, ``Messung`` ...) tells apart are repeats of one
+    spot: it gets their mean. Rows that start with ``#`` are comments. Process Simulate's point and frame lists are
+    read as they are.
 
     Parameters
     ----------
@@ -75,9 +78,10 @@ def read_table(path: Path, pose_needed: bool = True) -> Table:
     quantities = Quantities(grid, header, columns, lines, said, row_units, decimal)
     positions = quantities.values(POSITION)[0] if "x" in columns else None
     rotations, oriented = _rotations(grid, header, quantities, columns, lines)
-    return Table(
+    numbered = repeat_columns(header.titles)
+    table = Table(
         path=grid.path,
-        ids=_ids(grid, columns["id"], lines, positions),
+        ids=_ids(grid, columns["id"], lines, positions, [columns[title.name] for title in numbered]),
         xyz=positions,
         rotations=rotations,
         lines=lines,
@@ -91,6 +95,7 @@ def read_table(path: Path, pose_needed: bool = True) -> Table:
         unit=quantities.unit,
         issues=[*issues, *quantities.issues],
     )
+    return merge_repeats(table, numbered)
 
 
 def _grid(path: Path, pose_needed: bool) -> Grid:
@@ -225,8 +230,16 @@ def _unit_column(grid: Grid, header: Header, columns: Mapping[str, Sequence[Cell
     return [Said(lengths[0], f"its column {title.text!r} says so", lines[0])]
 
 
-def _ids(grid: Grid, cells: Sequence[Cell], lines: Sequence[int], positions: Array | None) -> list[str]:
+def _ids(
+    grid: Grid,
+    cells: Sequence[Cell],
+    lines: Sequence[int],
+    positions: Array | None,
+    numbered: Sequence[Sequence[Cell]],
+) -> list[str]:
+    """IDs of all rows; one stands in several only if columns tell the measurements of a spot apart."""
     seen: dict[str, int] = {}
+    measured: dict[tuple[str, ...], int] = {}
     ids: list[str] = []
     for row, (cell, line) in enumerate(zip(cells, lines, strict=True)):
         name = text_of(cell)
@@ -242,8 +255,11 @@ def _ids(grid: Grid, cells: Sequence[Cell], lines: Sequence[int], positions: Arr
             message = f"the ID {name} was rounded by a spreadsheet; format the column as text and enter the ID again"
             raise grid.bad(message, line)
         first = seen.setdefault(name.casefold(), row)
-        if first != row:
-            raise grid.bad(_twice(name, ids[first], first, row, lines, positions), line, "DUPLICATE_ID")
+        marks = [text_of(column[row]).casefold() for column in numbered]
+        told = any(marks) and any(text_of(column[first]) for column in numbered)
+        same = measured.setdefault((name.casefold(), *marks), row) if told else first
+        if same != row:
+            raise grid.bad(_twice(name, ids[same], same, row, lines, positions), line, "DUPLICATE_ID")
         ids.append(name)
     return ids
 
@@ -256,7 +272,10 @@ def _twice(name: str, other: str, first: int, row: int, lines: Sequence[int], po
     apart = float(np.linalg.norm(positions[row] - positions[first]))
     if apart == 0.0:
         return f"{message} with the same position; keep one"
-    return f"{message} with positions {apart:.2f} mm apart; find out which is right and keep that one"
+    return (
+        f"{message} with positions {apart:.2f} mm apart; find out which is right and keep that one (repeats of one "
+        "spot are numbered in a column repeat)"
+    )
 
 
 def _rotations(

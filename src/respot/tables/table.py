@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from scipy.spatial.transform import Rotation
 
 from respot.geometry import Array
 from respot.issues import BadInputError, Issue
+
+if TYPE_CHECKING:
+    from respot.tables.repeats import TableRepeats
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +49,8 @@ class Table:
         Unit of length in the file: ``"mm"``, ``"inch"``, ``"m"``, ``"cm"``, ``"um"`` or ``"foot"``.
     issues : sequence of Issue
         What was converted, left out or understood in one of several ways.
+    repeats : TableRepeats or None
+        Every row, where spots stand in several rows that a column tells apart; all else is then of their means.
     """
 
     path: str
@@ -61,6 +67,7 @@ class Table:
     numbers: Mapping[str, Array] = field(default_factory=dict)
     unit: str = "mm"
     issues: Sequence[Issue] = ()
+    repeats: TableRepeats | None = None
 
     @property
     def positions(self) -> Array:
