@@ -8,7 +8,7 @@ blocks of rows left out in turn; printed is the mean 3D error of the rows left o
 The rungs: base 6 and tool 3; joint offsets; a small 6-dof error behind every axis (prior 2 mm, 10 mrad); and on top
 of that the turn of the joints under gravity (prior 1 mrad), once as sines and cosines of the arm's pitch angles, once
 as the arm's load per mass and moment of each link. Where PROGRAMMED has torques ``tau1..`` [Nm], a turn of each joint
-in proportion takes the place of gravity, with joint offsets and with link errors. The fit is Gauss-Newton with Huber
+in proportion is tried too, without and with link errors. The fit is Gauss-Newton with Huber
 weights on the norm of the residual (1 mm); priors weigh against the robust spread of the residual.
 """
 
@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from respot.kinematics.gravity import gravity_basis
+from respot.kinematics.gravity import DOWN, gravity_basis
 from respot.kinematics.model import RobotModel
 from respot.kinematics.robot_file import robot_of
 
@@ -99,15 +99,11 @@ def axis_directions(robot: RobotModel) -> Array:
 
 def mass_columns(robot: RobotModel, data: Data) -> list[Column]:
     """Load of each link's mass [1 unit at 1 m] and moments on each axis; the robot stands upright."""
-    basis = gravity_basis(robot, data.joints, np.array([0.0, 0.0, -1.0]))
+    anywhere = np.random.default_rng(0).uniform(-90, 90, (20, robot.axes))
+    present = np.abs(gravity_basis(robot, anywhere, DOWN)).max(axis=0) > 1e-6
+    basis = gravity_basis(robot, data.joints, DOWN)
     basis[..., 0] /= 1000.0
-    return [
-        (axis, basis[:, axis, link, term])
-        for axis in range(robot.axes)
-        for link in range(axis, robot.axes)
-        for term in range(4)
-        if np.abs(basis[:, axis, link, term]).max() > 1e-9
-    ]
+    return [(int(axis), basis[:, axis, link, term]) for axis, link, term in np.argwhere(present)]
 
 
 def torque_columns(robot: RobotModel, data: Data) -> list[Column]:
@@ -121,7 +117,7 @@ def rungs(data: Data) -> list[Rung]:
     full = (LINK_MM,) * 3 + (LINK_RAD,) * 3
     found = [Rung("base + tool", none), Rung("+ joint offsets", offset), Rung("+ link errors", full)]
     if data.torques is not None:
-        found.append(Rung("offsets + torques", offset, torque_columns, COMPLIANCE))
+        found.append(Rung("base + tool + torques", none, torque_columns, COMPLIANCE))
         found.append(Rung("links + torques", full, torque_columns, COMPLIANCE))
     found.append(Rung("links + gravity, pitch", full, pitch_columns))
     found.append(Rung("links + gravity, masses", full, mass_columns))
@@ -255,7 +251,7 @@ def random_splits(count: int, share: float, seeds: int) -> Iterator[tuple[Index,
     for seed in range(seeds):
         order = np.random.default_rng(seed).permutation(count)
         tested = round(share * count)
-        yield order[tested:], order[:tested]
+        yield order[: count - tested], order[count - tested :]
 
 
 def block_splits(count: int, blocks: int) -> Iterator[tuple[Index, Index]]:
