@@ -250,7 +250,7 @@ def random_splits(count: int, share: float, seeds: int) -> Iterator[tuple[Index,
     """Rows to fit and rows to judge by, at random."""
     for seed in range(seeds):
         order = np.random.default_rng(seed).permutation(count)
-        tested = round(share * count)
+        tested = count - int((1.0 - share) * count + 1e-9)
         yield order[: count - tested], order[count - tested :]
 
 
