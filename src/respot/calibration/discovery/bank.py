@@ -1,0 +1,181 @@
+"""All columns of all terms over the spots that count, and what each of them can explain beside a model.
+
+Columns are in units of the prior, so that a direction in which the spots know less than the prior does is told by its
+size alone: it is dropped. Everything is done on products of columns (Gram matrices): a model of some terms is judged
+against thousands of others by small matrices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from respot.calibration.effects.catalogue import MECHANISMS
+from respot.calibration.effects.term import Term
+from respot.calibration.observations import Observations
+from respot.registration.covariance import jacobian
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
+
+ABSORBED = 1e-3
+"""A direction of which less than this (RMS) is no rigid motion is swallowed by the rigid part."""
+_EIGEN_FLOOR = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Gains:
+    """What each term explains beside a model.
+
+    Attributes
+    ----------
+    squares : (terms,) array
+        Sum of squares [mm^2].
+    ranks : (terms,) int array
+        Directions that the spots determine.
+    sizes : (terms,) array
+        Sum of squares of the parameters, in units of their priors: how far from plausible the answer is.
+    whiteners : dict of int to (terms of that size, k, k) array
+        By number of parameters: rows that turn products with the columns into independent shares.
+    """
+
+    squares: Array
+    ranks: Rows
+    sizes: Array
+    whiteners: dict[int, Array]
+
+
+def columns_of(observations: Observations, terms: Sequence[Term]) -> Array:
+    """Columns (n, 3, all parameters) of terms, in units of their priors [mm]."""
+    blocks = [
+        MECHANISMS[term.effect].shifts(observations, term) * np.array([each.prior for each in term.parameters])
+        for term in terms
+    ]
+    return np.concatenate([np.empty((len(observations), 3, 0)), *blocks], axis=2)
+
+
+class Bank:
+    """Columns of terms over some spots, the rigid part projected out.
+
+    Parameters
+    ----------
+    terms : sequence of Term
+    columns : (m, 3, all parameters) array
+        As `columns_of`, of the m spots that count.
+    points : (m, 3) array
+        Where these spots are, with the effects that are in the model already, source frame [mm].
+    """
+
+    def __init__(self, terms: Sequence[Term], columns: Array, points: Array) -> None:
+        self.spots = len(points)
+        self.terms = tuple(terms)
+        sizes = np.array([len(term.parameters) for term in self.terms], dtype=np.intp)
+        stops = np.cumsum(sizes)
+        self.slices = [slice(int(stop - size), int(stop)) for size, stop in zip(sizes, stops, strict=True)]
+        columns = np.ascontiguousarray(columns.reshape(3 * self.spots, -1))
+        self.raw = np.einsum("ij,ij->j", columns, columns)
+        points = points - points.mean(axis=0)
+        extent = max(float(np.sqrt(np.mean(points**2))), 1e-9)
+        self.rigid = np.linalg.qr(jacobian(points / extent).reshape(-1, 6))[0]
+        for _ in range(2):  # products lose half of the digits
+            columns = columns - self.rigid @ (self.rigid.T @ columns)
+        self.columns = columns
+        #: indices of terms by number of parameters, and of their columns
+        self.groups = {int(size): np.flatnonzero(sizes == size) for size in np.unique(sizes)}
+        self.places = {
+            size: np.array([range(self.slices[i].start, self.slices[i].stop) for i in members], dtype=np.intp)
+            for size, members in self.groups.items()
+        }
+
+    def __len__(self) -> int:
+        return len(self.terms)
+
+    @cached_property
+    def grams(self) -> dict[int, Array]:
+        """Products of each term's columns with themselves, (terms, k, k), by number of parameters."""
+        found = {}
+        for size, places in self.places.items():
+            stacked = np.empty((len(places), size, size))
+            for row, place in enumerate(places):
+                part = self.columns[:, place[0] : place[-1] + 1]
+                stacked[row] = part.T @ part
+            found[size] = stacked
+        return found
+
+    @cached_property
+    def shares(self) -> Array:
+        """Part of each term's columns (RMS, 0 to 1) that no rigid motion imitates, (terms,)."""
+        left = np.einsum("ij,ij->j", self.columns, self.columns)
+        return np.array([np.sqrt(left[part].sum() / max(float(self.raw[part].sum()), 1e-300)) for part in self.slices])
+
+    def project(self, vectors: Array) -> Array:
+        """Vectors (3m, ...) without their rigid part."""
+        result: Array = vectors - self.rigid @ (self.rigid.T @ vectors)
+        return result
+
+    def gains(self, basis: Array, left: Array, sigma: float) -> Gains:
+        """What each term explains of ``left`` beside ``basis``.
+
+        Parameters
+        ----------
+        basis : (3m, a) array
+            Orthonormal, without rigid part: the terms in the model.
+        left : (3m,) array
+            Residual of that model [mm].
+        sigma : float
+            Noise per coordinate [mm]: directions whose plausible size stays below it are not determined.
+        """
+        seen = basis.T @ self.columns
+        products = self.columns.T @ left
+        squares, ranks = np.zeros(len(self.terms)), np.zeros(len(self.terms), dtype=np.intp)
+        sizes = np.zeros(len(self.terms))
+        whiteners = {}
+        for size, members in self.groups.items():
+            places = self.places[size]
+            part = seen[:, places]  # a, terms, k
+            gram = self.grams[size] - np.einsum("atk,atl->tkl", part, part)
+            whitener, kept = self._whiten(gram, self.raw[places].sum(axis=1), sigma)
+            shares = np.einsum("tkl,tl->tk", whitener, products[places])
+            sizes[members] = np.sum((shares * np.linalg.norm(whitener, axis=2)) ** 2, axis=1)
+            squares[members], ranks[members] = np.sum(shares**2, axis=1), kept
+            whiteners[size] = whitener
+        return Gains(squares, ranks, sizes, whiteners)
+
+    @staticmethod
+    def _whiten(gram: Array, raw: Array, sigma: float) -> tuple[Array, Rows]:
+        values, vectors = np.linalg.eigh(gram)
+        floor = np.maximum(sigma**2, ABSORBED**2 * raw / gram.shape[1])[:, None]
+        known = values > floor
+        factor = np.where(known, 1.0 / np.sqrt(np.where(known, values, 1.0)), 0.0)
+        whitener = factor[:, :, None] * np.swapaxes(vectors, 1, 2)
+        return whitener, known.sum(axis=1).astype(np.intp)
+
+    def directions(self, index: int, basis: Array, sigma: float) -> Array:
+        """Orthonormal directions (3m, r) that a term adds to ``basis`` (3m, a)."""
+        part = self.columns[:, self.slices[index]]
+        raw = float(self.raw[self.slices[index]].sum())
+        for _ in range(2):
+            part = part - basis @ (basis.T @ part)
+        values, vectors = np.linalg.eigh(part.T @ part)
+        known = values > max(sigma**2, ABSORBED**2 * raw / part.shape[1], _EIGEN_FLOOR)
+        found = part @ (vectors[:, known] / np.sqrt(values[known]))
+        return np.asarray(found - basis @ (basis.T @ found))
+
+    def size_of(self, chosen: Sequence[int], wanted: Array, sigma: float) -> float:
+        """Sum of squares of the parameters of a model of some terms, in units of their priors."""
+        if not chosen:
+            return 0.0
+        part = np.hstack([self.columns[:, self.slices[index]] for index in chosen])
+        answer = np.linalg.solve(part.T @ part + max(sigma**2, _EIGEN_FLOOR) * np.eye(part.shape[1]), part.T @ wanted)
+        return float(answer @ answer)
+
+    def basis_of(self, chosen: Sequence[int], sigma: float) -> Array:
+        """Orthonormal basis (3m, a) of the chosen terms, in their order."""
+        basis = np.zeros((3 * self.spots, 0))
+        for index in chosen:
+            basis = np.hstack([basis, self.directions(index, basis, sigma)])
+        return basis

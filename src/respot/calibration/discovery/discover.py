@@ -1,0 +1,396 @@
+"""From paired spots to effects: search, outliers, gates, rivals, what is hidden, nested errors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from respot.calibration.discovery.bank import Bank, columns_of
+from respot.calibration.discovery.heldout import HeldOut, folds_of, heldout
+from respot.calibration.discovery.joint_fit import JointFit, fit_jointly
+from respot.calibration.discovery.outliers import misfit, settled
+from respot.calibration.discovery.rivals import RivalTable, rival_table
+from respot.calibration.discovery.selection import Selection, State
+from respot.calibration.discovery.significance import DRAWS
+from respot.calibration.discovery.unexplained import Unexplained, unexplained
+from respot.calibration.effects.catalogue import MECHANISMS, terms_of
+from respot.calibration.effects.moved import moved
+from respot.calibration.effects.term import Term
+from respot.calibration.observations import Observations
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+LEAST_SPOTS = 10
+"""With fewer spots no effect beyond names and tool is looked for."""
+_ROUNDS = 5
+_INNER_DRAWS = 299
+_ALIAS = 1e-6
+_ALIAS_P = 0.01
+_HIDDEN = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Accepted:
+    """One term of the final model with all that speaks for and against it."""
+
+    term: Term
+    values: Array
+    sd: Array
+    p_value: float
+    table: RivalTable
+    with_it: HeldOut
+    aliases: tuple[Term, ...]
+    named: bool
+
+    @property
+    def not_separated(self) -> tuple[Term, ...]:
+        """Other explanations that these spots do not tell from it."""
+        return (*self.table.not_separated, *self.aliases)
+
+
+@dataclass(frozen=True, eq=False)
+class Hidden:
+    """An effect that these spots cannot show, and how much of it is seen beside the rigid part (0 to 1)."""
+
+    term: Term
+    share: float
+
+
+@dataclass(frozen=True, eq=False)
+class Discovery:
+    """What was found.
+
+    Attributes
+    ----------
+    fit : JointFit
+        The final model.
+    accepted : tuple of Accepted
+        Its terms, the strongest first.
+    tried : tuple of (Term, float, float)
+        The best term of each effect that is not in the model: p value, and criterion beyond the final model.
+    hidden : tuple of Hidden
+    unexplained : Unexplained
+    heldout : HeldOut
+        Errors of the final structure by way to fold; the rigid part alone in ``heldout_before``.
+    nested_before, nested_after : (n, 3) arrays or None
+        Errors of spots that took no part in choosing or fitting, rigid part alone and with all that was chosen without
+        them, reference frame [mm]; NaN where a spot was never held out.
+    """
+
+    fit: JointFit
+    accepted: tuple[Accepted, ...]
+    tried: tuple[tuple[Term, float, float], ...]
+    hidden: tuple[Hidden, ...]
+    unexplained: Unexplained
+    heldout: HeldOut
+    heldout_before: HeldOut
+    nested_before: Array | None = None
+    nested_after: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """What a search needs, once for all spots."""
+
+    observations: Observations
+    reference: Array
+    terms: tuple[Term, ...]
+    columns: Array
+    allowed: Mask
+    aliases: tuple[int, ...]
+    noise: float | None
+    seed: int
+    step: Callable[[], None] = field(default=lambda: None)
+
+    def rows(self, rows: NDArray[np.intp]) -> _Search:
+        return replace(
+            self,
+            observations=self.observations.rows(rows),
+            reference=self.reference[rows],
+            columns=self.columns[rows],
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    selection: Selection
+    state: State
+    fit: JointFit
+
+
+def discover(
+    observations: Observations,
+    reference: Array,
+    *,
+    inliers: Mask | None = None,
+    noise: float | None = None,
+    seed: int = 0,
+    effects: frozenset[str] | None = None,
+    draws: int = DRAWS,
+    nested: bool = True,
+    progress: Callable[[], None] = lambda: None,
+) -> Discovery:
+    """Look for effects among paired spots, names repaired.
+
+    Parameters
+    ----------
+    observations : Observations
+        n spots.
+    reference : (n, 3) array
+        Where they were found [mm].
+    inliers : (n,) bool array, optional
+        What a robust rigid fit keeps: one of the places to start from.
+    noise : float, optional
+        Standard deviation per coordinate, known independently [mm]. Nothing continuous is named without it.
+    seed : int
+        Of permutations.
+    effects : set of str, optional
+        Effects to look for; default all of the catalogue.
+    draws : int
+        Permutations for each question.
+    nested : bool
+        Also hold out a fifth of the spots five times and choose without them.
+    progress : callable
+        Called as the work goes on.
+    """
+    search = _prepared(observations, reference, noise, seed, effects, progress)
+    starts = [np.ones(len(observations), dtype=np.bool_)]
+    if inliers is not None and not inliers.all():
+        starts.append(inliers)
+    found = min((_settle(search, start, draws) for start in starts), key=lambda each: misfit(each.fit))
+    found = _gated(search, found)
+    folds = folds_of(observations)
+    accepted = _accepted(search, found, folds)
+    left = unexplained(found.fit, observations, noise, seed)
+    accepted = tuple(replace(each, named=_named(each, left, found.fit, noise)) for each in accepted)
+    before = fit_jointly(observations, reference, (), found.fit.inliers)
+    progress()
+    nested_before = nested_after = None
+    if nested:
+        nested_before, nested_after = _nested(search, found.fit.inliers, draws)
+    return Discovery(
+        found.fit,
+        accepted,
+        _tried(found),
+        _hidden(search),
+        left,
+        heldout(found.fit, folds),
+        heldout(before, folds),
+        nested_before,
+        nested_after,
+    )
+
+
+def _prepared(
+    observations: Observations,
+    reference: Array,
+    noise: float | None,
+    seed: int,
+    effects: frozenset[str] | None,
+    step: Callable[[], None],
+) -> _Search:
+    terms = tuple(terms_of(observations, effects))
+    columns = columns_of(observations, terms)
+    bank = Bank(terms, columns, observations.positions)
+    # directions that even the widest plausible error hides behind rounding
+    whole = bank.gains(np.zeros((3 * len(observations), 0)), np.zeros(3 * len(observations)), 0.0)
+    aliases = _aliases_of_tool(terms, columns)
+    allowed = whole.ranks > 0
+    allowed[list(aliases)] = False
+    return _Search(observations, reference, terms, columns, allowed, aliases, noise, seed, step)
+
+
+def _aliases_of_tool(terms: Sequence[Term], columns: Array) -> tuple[int, ...]:
+    """Terms that move a spot by a constant in the tool: the last axis's zero, the flange's length. No spot tells them."""
+    tool = [number for number, term in enumerate(terms) if term.effect == "tool_offset"]
+    if not tool:
+        return ()
+    stops = np.cumsum([len(term.parameters) for term in terms])
+    flat = columns.reshape(-1, columns.shape[2])
+    span = np.linalg.qr(flat[:, stops[tool[0]] - 3 : stops[tool[0]]])[0]
+    found = []
+    for number, term in enumerate(terms):
+        if MECHANISMS[term.effect].acts not in ("joints", "arm") or term.effect == "link_geometry":
+            continue
+        part = flat[:, stops[number] - len(term.parameters) : stops[number]]
+        rest = part - span @ (span.T @ part)
+        if np.linalg.norm(rest) < _ALIAS * max(float(np.linalg.norm(part)), 1e-300):
+            found.append(number)
+    return tuple(found)
+
+
+def _settle(search: _Search, inliers: Mask, draws: int) -> _Found:
+    """Search, fit, judge outliers by the model, and search again until nothing changes."""
+    seen: set[tuple[bytes, tuple[int, ...]]] = set()
+    fit = fit_jointly(search.observations, search.reference, (), inliers)
+    found: _Found | None = None
+    for _ in range(_ROUNDS):
+        rows = np.flatnonzero(inliers)
+        bank = Bank(search.terms, search.columns[rows], fit.moved[rows])
+        wanted = bank.project(fit.linear[rows].ravel())
+        selection = Selection(
+            bank, wanted, search.noise, search.allowed, draws=draws, seed=search.seed, step=search.step
+        )
+        if len(rows) >= LEAST_SPOTS:
+            state = selection.search()
+        else:
+            state = selection.state((), 0.0)
+        chosen = tuple(sorted(state.chosen))
+        fit = fit_jointly(search.observations, search.reference, [search.terms[i] for i in chosen], inliers)
+        found = _Found(selection, replace(state, chosen=chosen), fit)
+        inliers = settled(fit)
+        key = (np.packbits(inliers).tobytes(), chosen)
+        if key in seen:
+            break
+        seen.add(key)
+        if not np.array_equal(inliers, fit.inliers):
+            fit = fit_jointly(search.observations, search.reference, fit.terms, inliers, fit.values)
+    assert found is not None  # noqa: S101 - at least one round
+    return found
+
+
+def _gated(search: _Search, found: _Found) -> _Found:
+    """Leave out terms that do not help spots that were held out, by at least two ways to fold."""
+    rows = np.flatnonzero(found.fit.inliers)
+    while found.state.chosen:
+        folds = folds_of(search.observations)
+        failing = []
+        for index in found.state.chosen:
+            term = search.terms[index]
+            without = [search.terms[i] for i in found.state.chosen if i != index]
+            bare = fit_jointly(search.observations, search.reference, without, found.fit.inliers)
+            skip = _skipped(search.observations, term)
+            one, other = heldout(found.fit, folds, skip), heldout(bare, folds, skip)
+            both = [scheme for scheme in one.rms if scheme in other.rms]
+            gains = [other.rms[scheme] - one.rms[scheme] for scheme in both]
+            better = sum(gain > 0.0 for gain in gains)
+            if better < min(2, len(both)) or (gains and sum(gains) <= 0.0):
+                failing.append((sum(gains), index))
+        if not failing:
+            return found
+        worst = min(failing)[1]
+        chosen = tuple(i for i in found.state.chosen if i != worst)
+        fit = fit_jointly(search.observations, search.reference, [search.terms[i] for i in chosen], found.fit.inliers)
+        bank = Bank(search.terms, search.columns[rows], fit.moved[rows])
+        selection = Selection(
+            bank,
+            bank.project(fit.linear[rows].ravel()),
+            search.noise,
+            search.allowed,
+            draws=found.selection.draws,
+            seed=search.seed,
+            step=search.step,
+        )
+        found = _Found(selection, selection.state(chosen, found.fit.sigma), fit)
+    return found
+
+
+def _skipped(observations: Observations, term: Term) -> frozenset[str]:
+    """Ways to fold that a term's own column makes."""
+    column = observations.columns.get(term.own)
+    return frozenset({"time"}) if column is not None and column.role == "time" else frozenset()
+
+
+def _accepted(search: _Search, found: _Found, folds: dict[str, NDArray[np.intp]]) -> tuple[Accepted, ...]:
+    selection, fit = found.selection, found.fit
+    state = selection.state(found.state.chosen, fit.sigma)
+    made = []
+    for place, index in enumerate(found.state.chosen):
+        search.step()
+        skip = _skipped(search.observations, search.terms[index])
+        table = rival_table(selection, state, index, search.observations, search.reference, fit, folds, skip)
+        one = Accepted(
+            search.terms[index],
+            fit.values[place],
+            fit.value_sd[place],
+            selection.chance_of(state, index),
+            table,
+            heldout(fit, folds, skip),
+            _tool_aliases(search, found, index),
+            named=False,
+        )
+        rest = selection.state([i for i in state.chosen if i != index], fit.sigma)
+        made.append((rest.criterion - state.criterion, one))
+    return tuple(one for _, one in sorted(made, key=lambda pair: -pair[0]))
+
+
+def _tool_aliases(search: _Search, found: _Found, index: int) -> tuple[Term, ...]:
+    """Of a tool offset: single causes in the arm that explain it as well as the offset does."""
+    if search.terms[index].effect != "tool_offset":
+        return ()
+    others = [search.terms[i] for i in found.state.chosen if i != index]
+    full = float(np.sum(found.fit.residuals[found.fit.inliers] ** 2))
+    alike = []
+    for alias in search.aliases:
+        term = search.terms[alias]
+        trial = fit_jointly(search.observations, search.reference, [*others, term], found.fit.inliers)
+        extra = 3 - len(term.parameters)
+        rest = float(np.sum(trial.residuals[trial.inliers] ** 2)) - full
+        value = rest / extra / found.fit.sigma**2
+        if float(stats.f.sf(value, extra, found.fit.free)) > _ALIAS_P:
+            alike.append(term)
+    return tuple(alike)
+
+
+def _named(one: Accepted, left: Unexplained, fit: JointFit, noise: float | None) -> bool:
+    """Whether an effect may be called the cause: floor reached, nothing left, rivals lose, all of it determined."""
+    if noise is None or not left.reached or left.present or MECHANISMS[one.term.effect].describes:
+        return False
+    priors = np.array([parameter.prior for parameter in one.term.parameters])
+    plausible = bool(np.all(np.abs(one.values) <= 4.0 * priors))
+    return not one.not_separated and plausible and len(fit.residuals) >= LEAST_SPOTS
+
+
+def _tried(found: _Found) -> tuple[tuple[Term, float, float], ...]:
+    """The best term of each effect that is not in the model, with its chance beside the model."""
+    selection, state = found.selection, found.state
+    state = selection.state(state.chosen, found.fit.sigma)
+    criteria = selection.beside(state)
+    chances = selection.chances(state)
+    best: dict[str, int] = {}
+    for index in np.argsort(criteria).tolist():
+        if np.isfinite(criteria[index]):
+            best.setdefault(selection.bank.terms[index].effect, index)
+    return tuple(
+        (selection.bank.terms[index], float(chances[index]), float(criteria[index] - state.criterion))
+        for index in best.values()
+    )
+
+
+def _hidden(search: _Search) -> tuple[Hidden, ...]:
+    """Effects that the rigid part swallows whole, or nearly."""
+    bank = Bank(search.terms, search.columns, search.observations.positions)
+    shares = bank.shares
+    seen: dict[tuple[object, ...], Hidden] = {}
+    for number, term in enumerate(search.terms):
+        if shares[number] < _HIDDEN or number in search.aliases:
+            seen.setdefault(term.key, Hidden(term, float(shares[number])))
+    return tuple(seen.values())
+
+
+def _nested(search: _Search, inliers: Mask, draws: int) -> tuple[Array, Array]:
+    """Errors (n, 3) of each fifth of the spots by a model that was chosen and fitted without it [mm]."""
+    count = len(search.observations)
+    before, after = np.full((count, 3), np.nan), np.full((count, 3), np.nan)
+    labels = folds_of(search.observations)["mixed"]
+    for fold in range(int(labels.max()) + 1):
+        rest, out = np.flatnonzero(labels != fold), np.flatnonzero(labels == fold)
+        if len(rest) < LEAST_SPOTS:
+            continue
+        part = search.rows(rest)
+        found = _gated(part, _settle(part, inliers[rest], min(draws, _INNER_DRAWS)))
+        after[out] = _errors(search, found.fit, out)
+        rigid = fit_jointly(part.observations, part.reference, (), found.fit.inliers)
+        before[out] = _errors(search, rigid, out)
+        search.step()
+    return before, after
+
+
+def _errors(search: _Search, fit: JointFit, out: NDArray[np.intp]) -> Array:
+    places, _ = moved(search.observations.rows(out), fit.terms, fit.values)
+    return np.asarray(places @ fit.rotation.T + fit.translation - search.reference[out])

@@ -1,0 +1,257 @@
+"""The search for a set of terms: forward steps, each judged by permutations, then exchange, merge and backward steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from respot.calibration.discovery.bank import Bank
+from respot.calibration.discovery.significance import ALPHA, largest_by_chance, p_value, scores
+from respot.calibration.effects.catalogue import MECHANISMS
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+MOST_EFFECTS = 6
+_LAST = 10.0
+"""A term that only describes must be better by this much (as `Selection.criterion`) than one that may be a cause."""
+_BETTER = 0.5
+_CANDIDATES = 12
+_OBVIOUS = 12.0
+"""Scores beyond this never come by chance: where only yes or no is asked, no permutations are needed."""
+_ROUNDS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A model of some terms.
+
+    Attributes
+    ----------
+    chosen : tuple of int
+        Indices in the bank.
+    basis : (3m, a) array
+        Orthonormal directions of its terms.
+    left : (3m,) array
+        Residual [mm].
+    criterion : float
+        Smaller is better.
+    cost : float
+        Part of the criterion that stands for parameters far from plausible, and for terms that only describe.
+    """
+
+    chosen: tuple[int, ...]
+    basis: Array
+    left: Array
+    criterion: float
+    cost: float
+
+
+class Selection:
+    """Search over the terms of a bank for what explains ``wanted``.
+
+    Parameters
+    ----------
+    bank : Bank
+    wanted : (3m,) array
+        Shifts that the source needs, without their rigid part [mm].
+    noise : float or None
+        Known noise per coordinate [mm].
+    allowed : (terms,) bool array
+        Terms that may be chosen.
+    draws, seed : int
+        Of the permutations.
+    step : callable
+        Called after each forward step.
+    """
+
+    def __init__(
+        self,
+        bank: Bank,
+        wanted: Array,
+        noise: float | None,
+        allowed: Mask,
+        *,
+        draws: int,
+        seed: int,
+        step: Callable[[], None] = lambda: None,
+    ) -> None:
+        self.bank, self.wanted, self.noise = bank, wanted, noise
+        self.allowed, self.draws, self.seed, self._step = allowed, draws, seed, step
+        self._handicap = np.array([_LAST * MECHANISMS[term.effect].describes for term in bank.terms])
+        self._keys = [term.key for term in bank.terms]
+
+    @property
+    def count(self) -> int:
+        """Number of coordinates."""
+        return len(self.wanted)
+
+    def free(self, state: State) -> int:
+        """Degrees of freedom of a state's residual."""
+        return max(self.count - 6 - state.basis.shape[1], 1)
+
+    def sigma(self, state: State) -> float:
+        """Noise per coordinate that a state leaves [mm]; the known one where there is one and it is less."""
+        own = float(np.sqrt(state.left @ state.left / self.free(state)))
+        return own if self.noise is None else min(own, self.noise)
+
+    def criterion(self, square_sum: Array | float, rank: Array | int, cost: Array | float) -> Array:
+        """Schwarz's criterion with the number of spots as sample size, plus what implausible parameters cost."""
+        variance = np.maximum(np.asarray(square_sum) / self.count, 1e-12)
+        return np.asarray(self.count * np.log(variance) + np.asarray(rank) * np.log(self.bank.spots) + cost)
+
+    def state(self, chosen: Sequence[int], sigma: float) -> State:
+        """Model of some terms."""
+        basis = self.bank.basis_of(chosen, sigma)
+        left = self.wanted - basis @ (basis.T @ self.wanted)
+        cost = float(self._handicap[list(chosen)].sum()) + self.bank.size_of(chosen, self.wanted, sigma)
+        return State(tuple(chosen), basis, left, float(self.criterion(left @ left, basis.shape[1], cost)), cost)
+
+    def beside(self, state: State) -> Array:
+        """Criterion (terms,) of a state with each term added; infinite for terms that may not be, or add nothing."""
+        gains = self.bank.gains(state.basis, state.left, self.sigma(state))
+        after = np.maximum(state.left @ state.left - gains.squares, 0.0)
+        cost = state.cost + self._handicap + gains.sizes
+        found = self.criterion(after, gains.ranks + state.basis.shape[1], cost)
+        return np.where(self.allowed & (gains.ranks > 0) & ~self._taken(state), found, np.inf)
+
+    def _taken(self, state: State) -> Mask:
+        keys = {self._keys[index] for index in state.chosen}
+        return np.array([key in keys for key in self._keys])
+
+    def search(self) -> State:
+        """Find the set of terms."""
+        sigma = self.sigma(self.state((), 0.0))
+        state = self.state((), sigma)
+        for _ in range(_ROUNDS):
+            grown = self._grow(state)
+            better = self._prune(self._improve(grown))
+            if set(better.chosen) == set(state.chosen):
+                return better
+            state = better
+        return state
+
+    def _grow(self, state: State) -> State:
+        """Forward steps, as long as the best term beats what the best of all gains by chance."""
+        while len(state.chosen) < MOST_EFFECTS:
+            found = self._next(state)
+            if found is None:
+                break
+            state = self._exchange(self.state((*state.chosen, found), self.sigma(state)))
+            self._step()
+        return state
+
+    def _next(self, state: State) -> int | None:
+        gains = self.bank.gains(state.basis, state.left, self.sigma(state))
+        allowed = self.allowed & ~self._taken(state) & (gains.ranks > 0)
+        if not allowed.any():
+            return None
+        score = np.where(allowed, scores(gains, state.left, self.free(state)), -np.inf)
+        best = float(score.max())
+        if best < _OBVIOUS:
+            chance = self._chance(state, gains_allowed=allowed)
+            if p_value(best, chance) > ALPHA:
+                return None
+            limit = float(np.quantile(chance, 1.0 - ALPHA))
+        else:
+            limit = _OBVIOUS / 2.0
+        criteria = np.where(score >= limit, self.beside(state), np.inf)
+        return int(np.argmin(criteria)) if np.isfinite(criteria.min()) else None
+
+    def _chance(self, state: State, gains_allowed: Mask) -> Array:
+        gains = self.bank.gains(state.basis, state.left, self.sigma(state))
+        return largest_by_chance(
+            self.bank, state.basis, state.left, gains, gains_allowed, self.free(state), draws=self.draws, seed=self.seed
+        )
+
+    def chance_of(self, state: State, index: int) -> float:
+        """P value of one term of a state, the others given."""
+        rest = self.state([i for i in state.chosen if i != index], self.sigma(state))
+        gains = self.bank.gains(rest.basis, rest.left, self.sigma(state))
+        allowed = self.allowed & ~self._taken(rest)
+        score = float(scores(gains, rest.left, self.free(rest))[index])
+        chance = largest_by_chance(
+            self.bank, rest.basis, rest.left, gains, allowed, self.free(rest), draws=self.draws, seed=self.seed
+        )
+        return p_value(score, chance)
+
+    def chances(self, state: State) -> Array:
+        """P value (terms,) of each term that is not in a state, were it added; 1 for those that cannot be."""
+        gains = self.bank.gains(state.basis, state.left, self.sigma(state))
+        allowed = self.allowed & ~self._taken(state) & (gains.ranks > 0)
+        if not allowed.any():
+            return np.ones(len(self.bank))
+        score = scores(gains, state.left, self.free(state))
+        chance = np.sort(self._chance(state, allowed))
+        above = len(chance) - np.searchsorted(chance, score, side="left")
+        return np.where(allowed, (1.0 + above) / (1.0 + len(chance)), 1.0)
+
+    def _exchange(self, state: State) -> State:
+        """Replace one term by another as long as the criterion falls."""
+        for _ in range(4 * MOST_EFFECTS):
+            best, changed = state, False
+            for index in state.chosen:
+                rest = self.state([i for i in state.chosen if i != index], self.sigma(state))
+                criteria = self.beside(rest)
+                other = int(np.argmin(criteria))
+                if other != index and criteria[other] < best.criterion - _BETTER:
+                    trial = self.state((*rest.chosen, other), self.sigma(state))
+                    if trial.criterion < best.criterion - _BETTER:
+                        best, changed = trial, True
+            if not changed:
+                return state
+            state = best
+        return state
+
+    def _improve(self, state: State) -> State:
+        """Add a term and drop those that it makes needless: one cause in the place of several."""
+        if len(state.chosen) < 2:
+            return state
+        criteria = self.beside(state)
+        alone = self.beside(self.state((), self.sigma(state)))
+        candidates = dict.fromkeys(
+            [*np.argsort(alone)[:_CANDIDATES].tolist(), *np.argsort(criteria)[:_CANDIDATES].tolist()]
+        )
+        best = state
+        for index in candidates:
+            if not np.isfinite(alone[index]) or index in state.chosen:
+                continue
+            kept = [i for i in state.chosen if self._keys[i] != self._keys[index]]
+            trial = self._drop(self.state((index, *kept), self.sigma(state)), keep=index)
+            if trial.criterion < best.criterion - _BETTER:
+                best = trial
+        return self._exchange(best) if best is not state else state
+
+    def _drop(self, state: State, keep: int) -> State:
+        """Leave out terms as long as the criterion falls."""
+        while len(state.chosen) > 1:
+            trials = [
+                self.state([i for i in state.chosen if i != index], self.sigma(state))
+                for index in state.chosen
+                if index != keep
+            ]
+            best = min(trials, key=lambda trial: trial.criterion)
+            if best.criterion >= state.criterion:
+                return state
+            state = best
+        return state
+
+    def _prune(self, state: State) -> State:
+        """Leave out terms that chance explains, the others given."""
+        while state.chosen:
+            worst, worst_p = None, ALPHA
+            for index in state.chosen:
+                rest = self.state([i for i in state.chosen if i != index], self.sigma(state))
+                gains = self.bank.gains(rest.basis, rest.left, self.sigma(state))
+                if scores(gains, rest.left, self.free(rest))[index] >= _OBVIOUS:
+                    continue
+                chance = self.chance_of(state, index)
+                if chance > worst_p:
+                    worst, worst_p = index, chance
+            if worst is None:
+                return state
+            state = self.state([i for i in state.chosen if i != worst], self.sigma(state))
+        return state

@@ -1,0 +1,102 @@
+"""Effect ``covariate``: the residual follows any other column of the table, whatever the cause behind it is."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from respot.calibration.covariates import Covariate
+from respot.calibration.effects.effect import Remedy
+from respot.calibration.effects.group_shift import level_columns, level_terms
+from respot.calibration.effects.term import Mechanism, Parameter, Term, along, vector
+from respot.calibration.observations import Observations
+
+NAME = "covariate"
+PLAUSIBLE_MM = 5.0
+_SATURATING = (0.08, 0.2, 0.5)
+_PERIODS = (1.5, 2.0, 2.7, 3.5, 4.5, 5.5, 6.5, 7.5, 8.5, 9.5, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0)
+"""Waves over the range of a column."""
+_LEAST_DISTINCT = 5
+
+
+def _terms(observations: Observations) -> list[Term]:
+    found: list[Term] = []
+    for name, column in observations.columns.items():
+        if column.role == "approach":
+            continue
+        if column.values is not None:
+            found += _numeric(observations, name, column)
+        if column.role == "other" and column.labels is not None:
+            found += level_terms(observations, NAME, name)
+    return found
+
+
+def _numeric(observations: Observations, name: str, column: Covariate) -> list[Term]:
+    assert column.values is not None  # noqa: S101 - asked for a number
+    distinct = np.unique(column.values)
+    start, span = float(distinct[0]), float(distinct[-1] - distinct[0])
+    place = {"column": name}
+    own = {"start": start, "span": span}
+    shift = vector("", "mm", PLAUSIBLE_MM)
+    frames = ["part"] if observations.rotations is None else ["part", "tool"]
+    # time's own straight and saturating forms are drift and warm-up, a counter's in the tool is wear
+    known = {"time": ("part",), "counter": ("tool",)}.get(column.role, ())
+    found = [
+        Term(NAME, place, shift, {**own, "shape": "linear", "frame": frame}, own=name)
+        for frame in frames
+        if frame not in known
+    ]
+    if len(distinct) < _LEAST_DISTINCT:
+        return found
+    if column.role != "time":
+        found += [
+            Term(NAME, place, shift, {**own, "shape": "saturating", "scale": span * share, "frame": frame}, own=name)
+            for share in _SATURATING
+            for frame in frames
+        ]
+    waves = tuple(Parameter(f"{wave}_{axis}", "mm", PLAUSIBLE_MM) for wave in ("cos", "sin") for axis in "xyz")
+    found += [
+        Term(NAME, place, waves, {**own, "shape": "periodic", "waves": count, "frame": "part"}, own=name)
+        for count in _PERIODS
+        if 2.5 * count <= len(distinct)
+    ]
+    return found
+
+
+def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
+    if "shape" not in term.form:
+        return level_columns(observations, term)
+    values = observations.columns[term.where["column"]].values
+    assert values is not None  # noqa: S101 - the term was made of it
+    even = (values - term.form["start"]) / term.form["span"]
+    if term.form["shape"] == "periodic":
+        angle = 2.0 * np.pi * term.form["waves"] * even
+        return np.concatenate([along(np.cos(angle)), along(np.sin(angle))], axis=2)
+    if term.form["shape"] == "saturating":
+        even = 1.0 - np.exp(-even * term.form["span"] / term.form["scale"])
+    if term.form["frame"] == "tool":
+        return np.asarray(observations.tools * even[:, None, None])
+    return along(even)
+
+
+def _remedy(term: Term, values: NDArray[np.float64]) -> Remedy:
+    size = float(np.linalg.norm(values[:3]))
+    if "level" in term.where:
+        what = f"Spots with {term.where['column']} = {term.where['level']} lie {size:.2f} mm from the others"
+    else:
+        what = f"Spots move by up to about {size:.2f} mm with column {term.where['column']}"
+    text = (
+        f"{what}. The column tells where to look, not the cause: find out what changes with it, and measure both ways."
+    )
+    return Remedy("process", text)
+
+
+MECHANISM = Mechanism(
+    NAME,
+    "part",
+    _terms,
+    _columns,
+    _remedy,
+    needs="a further column",
+    separates="the same spots measured at both ends of the column",
+)

@@ -1,0 +1,67 @@
+"""Effect ``deformation``: a smooth field over the part. It can imitate most others, and so it comes last."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from respot.calibration.effects.effect import Remedy
+from respot.calibration.effects.term import Mechanism, Parameter, Term
+from respot.calibration.observations import Observations
+
+NAME = "deformation"
+PLAUSIBLE_MM = 5.0
+_STRAINS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+
+
+def _terms(observations: Observations) -> list[Term]:
+    centre = observations.positions.mean(axis=0)
+    half = np.maximum(np.abs(observations.positions - centre).max(axis=0), 1.0)
+    own = {"centre": centre.tolist(), "half": half.tolist()}
+    strain = tuple(Parameter(f"strain_{'xyz'[i]}{'xyz'[j]}", "mm", PLAUSIBLE_MM) for i, j in _STRAINS)
+    bend = tuple(
+        Parameter(f"bend_{axis}_{'xyz'[i]}{'xyz'[j]}", "mm", PLAUSIBLE_MM) for i, j in _STRAINS for axis in "xyz"
+    )
+    return [
+        Term(NAME, {}, strain, {**own, "order": 1}),
+        Term(NAME, {}, (*strain, *bend), {**own, "order": 2}),
+    ]
+
+
+def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
+    even = (observations.positions - np.array(term.form["centre"])) / np.array(term.form["half"])
+    columns = []
+    for i, j in _STRAINS:
+        column = np.zeros_like(even)
+        column[:, i] += even[:, j]
+        if i != j:
+            column[:, j] += even[:, i]
+        columns.append(column)
+    if term.form["order"] == 2:
+        for i, j in _STRAINS:
+            for axis in range(3):
+                column = np.zeros_like(even)
+                column[:, axis] = even[:, i] * even[:, j]
+                columns.append(column)
+    return np.stack(columns, axis=-1)
+
+
+def _remedy(term: Term, values: NDArray[np.float64]) -> Remedy:  # noqa: ARG001 - one place only
+    text = (
+        f"The part is not the shape of its drawing: a smooth field of up to about {np.abs(values).max():.2f} mm. It "
+        "describes what is left and is no cause: clamping, spring-back, heat. Measure the part by itself, then correct "
+        "the points where it is accepted as it is."
+    )
+    return Remedy("points", text)
+
+
+MECHANISM = Mechanism(
+    NAME,
+    "part",
+    _terms,
+    _columns,
+    _remedy,
+    needs="positions",
+    separates="the part measured by itself, away from the robot",
+    describes=True,
+)

@@ -1,0 +1,75 @@
+"""Effects ``drift`` and ``warmup``: everything moves with time, evenly or towards an end: one family."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from respot.calibration.effects.effect import Remedy
+from respot.calibration.effects.term import Mechanism, Parameter, Term, motion_about, vector
+from respot.calibration.observations import Observations
+
+DRIFT, WARMUP = "drift", "warmup"
+PLAUSIBLE_MM, PLAUSIBLE_DEG = 3.0, 0.2
+_SHARES = (0.05, 0.1, 0.2, 0.35, 0.6)
+"""Time constants that are tried, as shares of the measuring time."""
+
+
+def _terms(observations: Observations, name: str) -> list[Term]:
+    found = []
+    centre = observations.positions.mean(axis=0).tolist()
+    shift = vector("", "mm", PLAUSIBLE_MM)
+    turn = tuple(Parameter(f"r{axis}", "deg", PLAUSIBLE_DEG) for axis in "xyz")
+    for column, covariate in observations.columns.items():
+        if covariate.role != "time" or covariate.values is None:
+            continue
+        start, span = float(covariate.values.min()), float(np.ptp(covariate.values))
+        if span <= 0.0:
+            continue
+        forms = [{}] if name == DRIFT else [{"time_constant": round(span * share, 4)} for share in _SHARES]
+        for form in forms:
+            own = {"start": start, "span": span, "centre": centre, **form}
+            found.append(Term(name, {"column": column}, shift, {**own, "moves": "shift"}, own=column))
+            found.append(Term(name, {"column": column}, (*shift, *turn), {**own, "moves": "body"}, own=column))
+    return found
+
+
+def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
+    values = observations.columns[term.where["column"]].values
+    assert values is not None  # noqa: S101 - the term was made of it
+    elapsed = values - term.form["start"]
+    if "time_constant" in term.form:
+        share = 1.0 - np.exp(-elapsed / term.form["time_constant"])
+    else:
+        share = elapsed / term.form["span"]
+    columns = motion_about(observations.positions, share, np.array(term.form["centre"]))
+    return columns[:, :, :3] if term.form["moves"] == "shift" else columns
+
+
+def _remedy(term: Term, values: NDArray[np.float64]) -> Remedy:
+    size = float(np.linalg.norm(values[:3]))
+    if "time_constant" in term.form:
+        how = f"towards an end, {size:.2f} mm away, with a time constant of about {term.form['time_constant']:.0f} (column {term.where['column']})"
+    else:
+        how = f"by {size:.2f} mm over the measurement (column {term.where['column']})"
+    text = (
+        f"Spots move with time, {how}: robot, fixture or tracker were not yet warm, or one of them slipped. Measure again "
+        "after a warm-up run, with a fixed point measured in between; correct nothing before."
+    )
+    return Remedy("process", text)
+
+
+_SEPARATES = "some spots measured at the start and again at the end; spots in a random order"
+
+MECHANISMS = tuple(
+    Mechanism(
+        name,
+        "part",
+        lambda observations, name=name: _terms(observations, name),  # type: ignore[misc]
+        _columns,
+        _remedy,
+        needs="a column with the time",
+        separates=_SEPARATES,
+    )
+    for name in (DRIFT, WARMUP)
+)

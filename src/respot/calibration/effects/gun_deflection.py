@@ -1,0 +1,56 @@
+"""Effect ``gun_deflection``: the gun bends when it squeezes, so that the weld moves along the tool with the force."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from respot.calibration.effects.effect import Remedy
+from respot.calibration.effects.term import Mechanism, Parameter, Term, vector
+from respot.calibration.observations import Observations
+
+NAME = "gun_deflection"
+PLAUSIBLE_MM = 5.0
+_Z = 2
+
+
+def _terms(observations: Observations) -> list[Term]:
+    if observations.rotations is None:
+        return []
+    found = []
+    for name, column in observations.columns.items():
+        if column.role == "force" and column.values is not None:
+            form = {"full": float(np.abs(column.values).max())}
+            one = (Parameter("z", "mm", PLAUSIBLE_MM),)
+            found.append(Term(NAME, {"column": name}, one, {**form, "along": "z"}, own=name))
+            found.append(
+                Term(NAME, {"column": name}, vector("", "mm", PLAUSIBLE_MM), {**form, "along": "any"}, own=name)
+            )
+    return found
+
+
+def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
+    force = observations.columns[term.where["column"]].values
+    assert force is not None  # noqa: S101 - the term was made of it
+    tools = observations.tools * (force / term.form["full"])[:, None, None]
+    return tools[:, :, _Z:] if term.form["along"] == "z" else tools
+
+
+def _remedy(term: Term, values: NDArray[np.float64]) -> Remedy:
+    text = (
+        f"The weld moves by {float(np.linalg.norm(values)):.2f} mm in the tool at the highest force of column "
+        f"{term.where['column']}: the gun bends as it squeezes. Enter the gun's deflection in its data (KUKA: ServoGun "
+        "compensation, ABB: the tool's force calibration), or correct the points; never both."
+    )
+    return Remedy("tool", text)
+
+
+MECHANISM = Mechanism(
+    NAME,
+    "tool",
+    _terms,
+    _columns,
+    _remedy,
+    needs="orientation and a column with the squeeze force",
+    separates="the same spots with the gun open, and at two forces",
+)

@@ -1,0 +1,89 @@
+"""Where effects move spots: exactly through the arm, forward and backward."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from respot.calibration.effects.catalogue import MECHANISMS
+from respot.calibration.effects.term import Term
+from respot.calibration.observations import Observations
+
+Array = NDArray[np.float64]
+
+_TURNS = 20
+_STILL_MM = 1e-10
+
+
+def moved(observations: Observations, terms: Sequence[Term], values: Sequence[Array]) -> tuple[Array, Rotation | None]:
+    """Poses of the TCP with the effects in them, source frame.
+
+    Errors of joints and lengths go through the arm's own kinematics (DESIGN section 6: ``FK(q + dq, geometry + dg) *
+    tool * dtool``); shifts in the tool turn with it; shifts of the part come last.
+
+    Parameters
+    ----------
+    observations : Observations
+        n spots.
+    terms, values : sequences of equal length
+        Terms and the values of their parameters.
+
+    Returns
+    -------
+    ((n, 3) array, Rotation of n or None)
+        [mm]
+    """
+    points, rotations = observations.positions, observations.rotations
+    turned: Rotation | None = None
+    arm = [(term, value) for term, value in zip(terms, values, strict=True) if _through_arm(term)]
+    if arm:
+        points, turned = _through(observations, arm)
+        rotations = None if rotations is None else turned * rotations
+    for term, value in zip(terms, values, strict=True):
+        if _through_arm(term):
+            continue
+        mechanism = MECHANISMS[term.effect]
+        shift = mechanism.shifts(observations, term) @ value
+        points = points + (turned.apply(shift) if turned is not None and mechanism.acts == "tool" else shift)
+    return points, rotations
+
+
+def _through_arm(term: Term) -> bool:
+    return MECHANISMS[term.effect].acts == "joints" or term.effect == "link_length"
+
+
+def _through(observations: Observations, arm: Sequence[tuple[Term, Array]]) -> tuple[Array, Rotation]:
+    """TCP (n, 3) of the arm with its errors [mm], and by which rotation its tools are turned; source frame."""
+    robot, joints = observations.robot, observations.joints
+    assert robot is not None and joints is not None  # noqa: S101 - terms of the arm were made of them
+    lengths: dict[str, float] = {}
+    for term, value in arm:
+        if term.effect == "link_length":
+            lengths[term.where["parameter"]] = lengths.get(term.where["parameter"], 0.0) + float(value[0])
+        else:
+            joints = joints + MECHANISMS[term.effect].columns(observations, term) @ value
+    model = robot.with_parameters(lengths) if lengths else robot
+    old, new = observations.flange2base, model.forward(joints)
+    tip = old.inv().apply(observations.points_in_base)
+    base = observations.base2source
+    turned = base.rotation * (new.rotation * old.rotation.inv()) * base.rotation.inv()
+    return np.asarray(base.apply(new.apply(tip))), turned
+
+
+def unmoved(observations: Observations, terms: Sequence[Term], values: Sequence[Array], wanted: Array) -> Array:
+    """Positions (n, 3) that the effects move to ``wanted`` (n, 3), by fixed point; joints and columns as observed [mm].
+
+    What depends on the place itself (a scale, a turn) is computed at the place found.
+    """
+    found = wanted.copy()
+    for _ in range(_TURNS):
+        there, _ = moved(replace(observations, positions=found), terms, values)
+        step = wanted - there
+        found = found + step
+        if float(np.abs(step).max(initial=0.0)) < _STILL_MM:
+            break
+    return found

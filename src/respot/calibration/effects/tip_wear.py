@@ -1,0 +1,56 @@
+"""Effect ``tip_wear``: the electrode wears with every weld, along an axis of the tool that need not be Z."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from respot.calibration.effects.effect import Remedy
+from respot.calibration.effects.term import Mechanism, Term, vector
+from respot.calibration.observations import Observations
+
+NAME = "tip_wear"
+PLAUSIBLE_MM = 5.0
+
+
+def _terms(observations: Observations) -> list[Term]:
+    if observations.rotations is None:
+        return []
+    return [
+        Term(
+            NAME,
+            {"column": name},
+            vector("", "mm", PLAUSIBLE_MM),
+            {"full": float(np.abs(column.values).max())},
+            own=name,
+        )
+        for name, column in observations.columns.items()
+        if column.role == "counter" and column.values is not None
+    ]
+
+
+def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
+    count = observations.columns[term.where["column"]].values
+    assert count is not None  # noqa: S101 - the term was made of it
+    return np.asarray(observations.tools * (count / term.form["full"])[:, None, None])
+
+
+def _remedy(term: Term, values: NDArray[np.float64]) -> Remedy:
+    x, y, z = values.tolist()
+    text = (
+        f"The point of contact moves by {x:+.2f} {y:+.2f} {z:+.2f} mm in the tool until {term.form['full']:g} of column "
+        f"{term.where['column']}: tips wear and are dressed shorter; only a new cap resets it. Switch on the controller's "
+        "wear compensation, or change caps earlier. Do not correct points for it: a new cap would undo that."
+    )
+    return Remedy("process", text)
+
+
+MECHANISM = Mechanism(
+    NAME,
+    "tool",
+    _terms,
+    _columns,
+    _remedy,
+    needs="orientation and a column that counts welds or dressings since the last cap",
+    separates="the same spots right before and right after a change of caps",
+)
