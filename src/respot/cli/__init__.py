@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from respot import __version__
-from respot.cli import check, convert, demo, fit, inspect, predict, robots, validate
+from respot.cli import check, convert, demo, fit, inspect, predict, robots, simulate, validate
 
 app = typer.Typer(
     name="respot",
@@ -28,6 +28,7 @@ _COMMANDS = {
     "convert": convert,
     "check": check,
     "robots": robots,
+    "simulate": simulate,
 }
 for name, command in _COMMANDS.items():
     app.command(name, help=command.HELP)(command.run)

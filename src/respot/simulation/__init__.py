@@ -1,7 +1,8 @@
 """Lines with hidden effects, to try the engine on. Imports nothing of it: the two cannot agree by construction."""
 
+from respot.simulation.backup import backup_files, files_of
 from respot.simulation.effects import EFFECTS, OUTSIDE
 from respot.simulation.line import LAYOUTS, Line, simulate
 from respot.simulation.robots import ROBOTS
 
-__all__ = ["EFFECTS", "LAYOUTS", "OUTSIDE", "ROBOTS", "Line", "simulate"]
+__all__ = ["EFFECTS", "LAYOUTS", "OUTSIDE", "ROBOTS", "Line", "backup_files", "files_of", "simulate"]
