@@ -12,7 +12,8 @@ For each record OUT gets ``NAME_programmed.csv`` (``id,j1..`` in degrees and wha
 - ``aubo_i5``: stops of a run, the mean of the joints read back and of the tracker's pose while the arm stands still;
   the two clocks differ by a constant that the motion itself shows. ``time_min`` is the middle of the stop;
 - ``iiwa_0kg``, ``iiwa_1.25kg``, ``iiwa_2.5kg`` and ``iiwa_all``: joints and torques read back (``tau1..7``, Nm),
-  poses, ``payload_kg``; the order of the rows is that of the run.
+  poses, ``payload_kg``; the order of the rows is that of the run. Only axes 1 and 2 move. The tool was mounted anew
+  for each load: its length differs by millimetres, the base stays.
 """
 
 from __future__ import annotations
