@@ -25,6 +25,7 @@ from respot.figures.words import figure
 _LEVELS = ("error", "warning", "info")
 #: More dots than this carry no names of their own: the page would grow by half.
 _MOST_NAMED_DOTS = 400
+_FINAL = {"paper": "the paper's method", "affine": "12 free numbers"}
 
 
 def fit_page(
@@ -62,7 +63,8 @@ def fit_page(
     told = list(issues or record.get("issues") or ())
     values = {
         "title": title,
-        "record": record,
+        "theory": record.get("kind") == "theory",
+        "method": record.get("method"),
         "verdict": verdict(record),
         "tiles": _tiles(record, tolerance),
         "compared": compared(record, source, reference),
@@ -91,7 +93,10 @@ def _tiles(record: Mapping[str, Any], tolerance: float) -> list[dict[str, str]]:
     tiles = []
     if record.get("frame") == "same" and record.get("as_found"):
         tiles.append({"label": "as found", "value": figure(record["as_found"]["rms"]), "unit": "mm"})
-    for label, key in (("plain shift and turn", "before"), ("final model", "after")):
+    for label, key in (
+        ("plain shift and turn", "before"),
+        (_FINAL.get(str(record.get("method")), "final model"), "after"),
+    ):
         tiles.append({"label": label, "value": figure(record[key]["rms"]), "unit": "mm"})
     heldout = (record.get("heldout") or {}).get("after")
     if heldout:

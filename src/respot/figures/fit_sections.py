@@ -16,6 +16,7 @@ from respot.figures.words import (
     effect_noun,
     figure,
     finding,
+    in_plain_words,
     listing,
     place,
     scheme_text,
@@ -251,7 +252,7 @@ def losers(record: Record) -> dict[str, Any]:
             "name": sentence(effect_noun(str(entry["name"]), entry.get("where"))).rstrip("."),
             "rms": figure(_tried_rms(entry)),
             "chance": "-" if entry.get("p_value") is None else chance(entry["p_value"]),
-            "verdict": sentence(str(entry.get("verdict") or _accepted(entry))),
+            "verdict": sentence(in_plain_words(str(entry.get("verdict") or _accepted(entry)))),
         }
         for entry in tried
     ]

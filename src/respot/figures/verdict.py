@@ -97,9 +97,11 @@ def _error(record: Mapping[str, Any], found: bool) -> str:
     if not (before and after):
         before, after, whose = source["before"], source["after"], "all spots that were fitted"
     low, high = figure(after["rms"]), figure(before["rms"])
+    if source is not record:
+        whose = f"{whose}, in respot's own robust fit,"
     if not found:
         left = f"What is left is {figure(source['after']['rms'])} mm (RMS)"
-        return f"{left}; for {whose} it is {low} mm. That is a result too."
+        return f"{left}; for {whose} it is {low} mm. Nothing found is a result too."
     model = "this" if len(source.get("effects") or ()) == 1 else "these"
     if after["rms"] < before["rms"]:
         return f"With {model} in the model the error of {whose} falls from {high} to {low} mm (RMS)."

@@ -53,10 +53,10 @@ EFFECTS: Mapping[str, EffectWords] = {
         "another way of writing angles or units", "one of the two lists writes angles or units another way"
     ),
     "wrong_frame": EffectWords(
-        "a wrong tool or base",
+        "a wrong frame (tool or base)",
         "{where} ran under another frame than the one listed",
         "a group",
-        "a wrong tool or base at {where}",
+        "a wrong frame (tool or base) at {where}",
     ),
     "tool_offset": EffectWords("a TCP that is off", "the TCP is {size}off, by the same amount at every spot"),
     "scale": EffectWords("growth or shrinkage (scale)", "one list is larger than the other{scaled}, as heat would do"),
@@ -145,14 +145,13 @@ def effect_noun(name: str, where: Mapping[str, Any] | None = None) -> str:
         if spot and words.placed:
             return words.placed.format(where=spot)
         return f"{words.noun} ({spot})" if spot else words.noun
-    # "joint_zero axis 2": what is known is replaced within the text; single words such as "scale" are common speech
-    text = re.sub(r"[a-z]+(?:_[a-z]+)+", lambda hit: _noun_or_same(hit.group()), name)
+    text = in_plain_words(name) if " " in name else name.replace("_", " ")
     return f"{text} ({spot})" if spot else text
 
 
-def _noun_or_same(name: str) -> str:
-    words = EFFECTS.get(name)
-    return words.noun if words is not None else name.replace("_", " ")
+def in_plain_words(text: str) -> str:
+    """Replace names of effects such as ``joint_zero`` in a text; single words such as "scale" are common speech."""
+    return re.sub(r"[a-z]+(?:_[a-z]+)+", lambda hit: EFFECTS[hit[0]].noun if hit[0] in EFFECTS else hit[0], text)
 
 
 def place(where: Mapping[str, Any]) -> str:
