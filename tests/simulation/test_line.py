@@ -25,7 +25,7 @@ def test_every_effect_runs_and_leaves_what_its_truth_says(name, layout):
     line = simulate(spots=60, effects=[f"{name}:0.7"], seed=11, layout=layout)
     (truth,) = line.truth
     assert truth["name"] == name
-    programmed = {spot: xyz for spot, xyz in zip(line.ids, line.positions, strict=True)}
+    programmed = dict(zip(line.ids, line.positions, strict=True))
     listed = np.array([programmed[spot] for spot in line.measured_ids])
     assert rms(rigid_rest(listed, line.measured_true)) == pytest.approx(truth["left_rms"], rel=1e-6, abs=1e-9)
     assert rms(in_world(line) - listed) == pytest.approx(truth["raw_rms"], rel=1e-6, abs=1e-9)
