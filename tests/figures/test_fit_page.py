@@ -7,11 +7,14 @@ from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from respot.calibration.report import report
 from respot.calibration.source_fit import FitOptions, fit_source
 from respot.figures.fit_page import fit_page
+from respot.figures.fit_sections import rigid_shift
 
 ROOT = Path(__file__).parents[2]
 VOID = {"meta", "br", "link", "img", "hr", "input"}
@@ -257,3 +260,18 @@ def test_many_spots(records):
     html = page(record)
     assert html.count("<td>SP") == 2000
     assert len(html) < 2_500_000
+
+
+def test_the_shift_is_that_of_the_middle_of_the_spots():
+    centre, turn, shift = np.array([4300.0, 20.0, 1400.0]), np.array([0.4, -0.3, 1.2]), np.array([60.0, -20.0, 30.0])
+    rotation = Rotation.from_rotvec(turn, degrees=True)
+    transform = {
+        "rotation": rotation.as_matrix().tolist(),
+        "translation": (centre - rotation.apply(centre - shift)).tolist(),
+        "centroid": centre.tolist(),
+        "ci95": dict.fromkeys(("tx", "ty", "tz", "rx", "ry", "rz"), 0.01),
+    }
+    told = rigid_shift({"frame": "same", "transform": transform})
+    assert told is not None
+    values = [float(value.split(" +- ")[0]) for _, value in told["rows"]]
+    assert values == pytest.approx([*shift, *turn], abs=0.001)
