@@ -68,11 +68,20 @@ def truth_json(line: Line) -> str:
         "effects": [dict(effect) for effect in line.truth],
         "world2tracker": line.world2tracker.tolist(),
         "measured_true": [
-            {"listed_as": listed, "is": real, "xyz": np.round(xyz, 4).tolist()}
+            {"listed_as": listed, "is": real, "xyz": np.round(xyz, 3).tolist()}
             for listed, real, xyz in zip(line.measured_ids, line.ids, line.measured_true, strict=True)
         ],
     }
-    return json.dumps(record, indent=1) + "\n"
+    return json.dumps(_short(record), indent=1) + "\n"
+
+
+def _short(value: object) -> object:
+    """Numbers to nine significant digits: the last ones depend on the processor."""
+    if isinstance(value, dict):
+        return {name: _short(item) for name, item in value.items()}
+    if isinstance(value, list):
+        return [_short(item) for item in value]
+    return float(f"{value:.9g}") if isinstance(value, float) else value
 
 
 def _orientation(line: Line) -> tuple[list[str], list[list[str]]]:
