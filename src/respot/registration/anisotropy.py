@@ -150,12 +150,34 @@ def noise_covariance(residuals: Array) -> tuple[Array, float]:
     residuals : (n, 3) array, n >= 3 [mm]
     """
     free, scatter = len(residuals) - 2, _scatter(residuals)
-    sphere = np.trace(scatter) / 3.0
-    square = float(np.sum(np.square(scatter)))
+    share = float(_sphere_share(scatter, free))
+    return drawn_to_sphere(scatter, free), share
+
+
+def drawn_to_sphere(scatter: Array, free: ArrayLike) -> Array:
+    """Covariances (..., 3, 3) drawn towards a sphere by OAS, never below the rounding of printed numbers [mm^2].
+
+    Parameters
+    ----------
+    scatter : (..., 3, 3) array
+        Mean outer products of residual vectors [mm^2].
+    free : (...) array
+        Over how many degrees of freedom.
+    """
+    share = _sphere_share(scatter, free)[..., None, None]
+    sphere = np.trace(scatter, axis1=-2, axis2=-1)[..., None, None] / 3.0
+    result: Array = (1.0 - share) * scatter + (share * sphere + SCALE_FLOOR**2) * np.eye(3)
+    return result
+
+
+def _sphere_share(scatter: Array, free: ArrayLike) -> Array:
+    """How far (...) OAS draws: 1 all the way."""
+    sphere = np.trace(scatter, axis1=-2, axis2=-1) / 3.0
+    square = np.sum(np.square(scatter), axis=(-2, -1))
     uneven = square - 3.0 * sphere**2
-    share = 1.0 if uneven <= 0 else min(1.0, (square / 3.0 + 9.0 * sphere**2) / ((free + 1.0 / 3.0) * uneven))
-    noise = (1.0 - share) * scatter + (share * sphere + SCALE_FLOOR**2) * np.eye(3)
-    return noise, float(share)
+    need = (square / 3.0 + 9.0 * sphere**2) / (np.asarray(free) + 1.0 / 3.0)
+    result: Array = np.where(uneven > need, need / np.where(uneven > need, uneven, 1.0), 1.0)
+    return result
 
 
 def _scatter(residuals: Array) -> Array:

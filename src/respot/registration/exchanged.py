@@ -32,7 +32,7 @@ from respot.registration.errors import RegistrationError
 from respot.registration.leave_one_out import leave_one_out
 from respot.registration.permutation import placement_p_value
 from respot.registration.rigid import check_pairs, fit_rigid
-from respot.registration.robust import INLIER_CHI, RobustFit, fit_robust
+from respot.registration.robust import INLIER_CHI, RobustFit, fit_robust, judged_by_direction
 from respot.registration.row_order import own_order
 from respot.registration.statistics import residual_directions, rms
 
@@ -117,7 +117,7 @@ def find_exchanged(ids: Sequence[str], source: ArrayLike, reference: ArrayLike, 
     """
     first, second = check_pairs(source, reference, minimum=4)
     permutation = np.arange(len(first), dtype=np.intp)
-    robust = fit_robust(first, second, seed=seed)
+    robust = fit_robust(first, second, seed=seed, by_direction=False)
     accepted: list[Rows] = []
     for _ in range(_ROUNDS):
         found = [
@@ -130,9 +130,10 @@ def find_exchanged(ids: Sequence[str], source: ArrayLike, reference: ArrayLike, 
         for cycle in found:
             permutation[cycle] = permutation[np.roll(cycle, -1)]
         accepted = _cycles(permutation)
-        robust = fit_robust(first, second[permutation], seed=seed)
+        robust = fit_robust(first, second[permutation], seed=seed, by_direction=False)
     evidence = tuple(_evidence(ids, first, second, permutation, robust, cycle, seed) for cycle in accepted)
-    return ExchangeResult(evidence, permutation, robust)
+    # last: along a flange, names of neighbours would pass for noise of that direction
+    return ExchangeResult(evidence, permutation, judged_by_direction(robust, first, second[permutation], seed=seed))
 
 
 def _candidates(source: Array, reference: Array, robust: RobustFit) -> list[Rows]:

@@ -9,6 +9,8 @@ that scale for known; of 8 good spots it throws one out in every tenth table, an
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
@@ -52,6 +54,11 @@ def settle_inliers(source: Array, reference: Array, inliers: Mask) -> Mask:
     (n,) bool array
         As given where the core is too small, or lies on a line, and can judge nobody.
     """
+    return settle(source, reference, inliers, outlier_excess)
+
+
+def settle(source: Array, reference: Array, inliers: Mask, test: Callable[[Array, Array, Mask], Array]) -> Mask:
+    """As `settle_inliers`, for any test of pairs: `outlier_excess`, or one with its arguments and answer."""
     inliers = inliers.copy()
     seen: set[bytes] = set()
     for _ in range(_TURNS):
@@ -60,7 +67,7 @@ def settle_inliers(source: Array, reference: Array, inliers: Mask) -> Mask:
             break
         seen.add(key)
         try:
-            excess = outlier_excess(source, reference, inliers)
+            excess = test(source, reference, inliers)
         except RegistrationError:
             break
         some = max(1, int(inliers.sum()) // _SHARE)

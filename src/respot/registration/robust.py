@@ -3,18 +3,21 @@
 Iteratively reweighted least squares on the *norm* of each residual vector (so that turning the frame changes
 nothing): least squares, then Huber weights, then Tukey's biweight (P. J. Huber, *Robust Statistics*, 1981; V. Yohai,
 Ann. Statist. 15 (1987)). A consensus start takes over where it finds a far smaller scale. From the core that this finds
-the outlier test decides, each pair by the least-squares fit of the others (`respot.registration.outlier_test`).
+the outlier test decides, each pair by the least-squares fit of the others (`respot.registration.outlier_test`); where
+the inliers' noise is not the same along all axes, with each direction's own (`respot.registration.direction_test`).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
+from respot.registration.anisotropy import SIGNIFICANCE, isotropy_p_value, noise_covariance
 from respot.registration.consensus import consensus_transform, quota_of
+from respot.registration.direction_test import direction_limit, settle_by_direction
 from respot.registration.errors import DegenerateError, RegistrationError
 from respot.registration.outlier_test import PARAMETERS, SCALE_FLOOR, f_limit, noise_of, settle_inliers
 from respot.registration.rigid import (
@@ -57,6 +60,9 @@ class RobustFit:
         with 3 and 3 m - 6 degrees of freedom for m inliers.
     start : str
         ``"least-squares"`` or ``"consensus"``: the start that led here.
+    by_direction : bool
+        Other pairs are inliers than by the length of residuals alone: each direction was judged by its own noise. The
+        threshold is then that along the noisiest direction.
     """
 
     rigid: RigidFit
@@ -65,6 +71,7 @@ class RobustFit:
     scale: float
     threshold: float
     start: str
+    by_direction: bool = False
 
 
 def robust_scale(lengths: Array, parameters: int = PARAMETERS) -> float:
@@ -77,7 +84,7 @@ def robust_scale(lengths: Array, parameters: int = PARAMETERS) -> float:
     return max(float(np.median(lengths)) / _MEDIAN_CHI * float(factor), SCALE_FLOOR)
 
 
-def fit_robust(source: ArrayLike, reference: ArrayLike, *, seed: int = 0) -> RobustFit:
+def fit_robust(source: ArrayLike, reference: ArrayLike, *, seed: int = 0, by_direction: bool = True) -> RobustFit:
     """Rigid fit that wrong pairs do not move.
 
     Parameters
@@ -85,7 +92,9 @@ def fit_robust(source: ArrayLike, reference: ArrayLike, *, seed: int = 0) -> Rob
     source, reference : (n, 3) arrays, n >= 4
         Paired points [mm].
     seed : int
-        Of the consensus start, the one place where chance plays a part (more than 1,000 triples).
+        Of the consensus start (more than 1,000 triples) and of the test for even noise, where chance plays a part.
+    by_direction : bool
+        Judge with each direction's own noise where that is not the same along all axes; see `judged_by_direction`.
 
     Raises
     ------
@@ -95,7 +104,7 @@ def fit_robust(source: ArrayLike, reference: ArrayLike, *, seed: int = 0) -> Rob
         All pairs, or the inliers, lie on a line.
     """
     first, second = check_pairs(source, reference, minimum=4)
-    step = max(1, -(-len(first) // _SAMPLE))
+    step = _step(len(first))
     sample, target = first[::step], second[::step]
     core, start = _core(sample, target, seed)
     inliers = settle_inliers(sample, target, core)
@@ -107,11 +116,61 @@ def fit_robust(source: ArrayLike, reference: ArrayLike, *, seed: int = 0) -> Rob
         raise DegenerateError(f"of the {int(inliers.sum())} pairs that agree with each other, {error}") from error
     except RegistrationError:
         inliers, rigid, start = np.ones(len(first), dtype=bool), fit_rigid(first, second), "least-squares"
+    fit = _robust_fit(rigid, inliers, start)
+    return judged_by_direction(fit, first, second, seed=seed) if by_direction else fit
+
+
+def judged_by_direction(fit: RobustFit, source: Array, reference: Array, *, seed: int = 0) -> RobustFit:
+    """Judge anew with each direction's own noise, where that changes a verdict and the noise is not a sphere.
+
+    Spots are spaced by hand along a flange: by the length of residuals good ones along it are put out, so that
+    intervals along it come out too narrow, and bad ones across it stay in. The inliers of the plain test are tested for
+    noise that is the same along all axes (`respot.registration.anisotropy.isotropy_p_value`, below 0.01).
+
+    Parameters
+    ----------
+    fit : RobustFit
+        By the length of residuals, of the same pairs.
+    source, reference : (n, 3) arrays [mm]
+    seed : int
+        Of the test's draws.
+    """
+    step = _step(len(source))
+    sample, target, core = source[::step], reference[::step], fit.inliers[::step]
+    inliers = settle_by_direction(sample, target, core)
+    if np.array_equal(inliers, core) or isotropy_p_value(sample[core], target[core], seed=seed) >= SIGNIFICANCE:
+        return fit
+    try:
+        near = fit_rigid(sample, target, inliers.astype(np.float64)).residuals[inliers]
+        noise = noise_covariance(near)[0]
+        if step > 1:
+            inliers = _among_all(source, reference, sample[inliers], target[inliers], whiten=_whiten(noise))
+        rigid = fit_rigid(source, reference, inliers.astype(np.float64))
+    except RegistrationError:
+        return fit
+    plain = _robust_fit(rigid, inliers, fit.start)
+    limit = float(direction_limit(noise[None], np.array([len(near)]))[0])
+    return replace(plain, threshold=float(np.sqrt(limit * np.linalg.eigvalsh(noise)[2])), by_direction=True)
+
+
+def _step(n: int) -> int:
+    """Every which pair of a table is in its sample."""
+    return max(1, -(-n // _SAMPLE))
+
+
+def _robust_fit(rigid: RigidFit, inliers: NDArray[np.bool_], start: str) -> RobustFit:
     lengths = np.sqrt(np.einsum("nk,nk->n", rigid.residuals, rigid.residuals))
     count = int(inliers.sum())
     scale = noise_of(float(np.sum(np.square(lengths[inliers]))), count)
     threshold = scale * float(np.sqrt(f_limit(count)))
     return RobustFit(rigid, inliers, _tukey(lengths / scale), scale, threshold, start)
+
+
+def _whiten(noise: Array) -> Array:
+    """Matrix (3, 3) that makes residual vectors of such noise a sphere of the same mean variance."""
+    values, vectors = np.linalg.eigh(noise)
+    result: Array = vectors * np.sqrt(np.trace(noise) / 3.0 / values) @ vectors.T
+    return result
 
 
 def _core(source: Array, reference: Array, seed: int) -> tuple[NDArray[np.bool_], str]:
@@ -126,13 +185,17 @@ def _core(source: Array, reference: Array, seed: int) -> tuple[NDArray[np.bool_]
     return (other, "consensus") if other_scale < clearly * scale else (core, start)
 
 
-def _among_all(source: Array, reference: Array, sample: Array, target: Array) -> NDArray[np.bool_]:
+def _among_all(
+    source: Array, reference: Array, sample: Array, target: Array, whiten: Array | None = None
+) -> NDArray[np.bool_]:
     """Inliers (n,) among all pairs of a large table, from the inliers of a sample of it.
 
-    The outlier test as it is for very many inliers: the prediction is certain beside the noise.
+    The outlier test as it is for very many inliers: the prediction is certain beside the noise. ``whiten`` (3, 3) makes
+    residuals with the noise of their direction a sphere.
     """
     rotation, translation = transform_of(sample, target)
-    noise = noise_of(float(np.sum(np.square(_lengths(sample, target, (rotation, translation))))), len(sample))
+    near = sample @ rotation.T + translation - target
+    noise = noise_of(float(np.sum(np.square(near if whiten is None else near @ whiten))), len(sample))
     origins = sample.mean(axis=0), target.mean(axis=0)
     inliers = np.zeros(len(source), dtype=bool)
     count = len(sample)
@@ -144,6 +207,7 @@ def _among_all(source: Array, reference: Array, sample: Array, target: Array) ->
             rows = slice(begin, begin + BLOCK)
             first, second = source[rows] - origins[0], reference[rows] - origins[1]
             residuals = first @ rotation.T + (rotation @ origins[0] + translation - origins[1]) - second
+            residuals = residuals if whiten is None else residuals @ whiten
             squares = np.einsum("nk,nk->n", residuals, residuals)
             inside = squares <= limit
             changed += int(np.count_nonzero(inside != inliers[rows]))
