@@ -202,6 +202,16 @@ def test_effects_need_no_more_than_their_name(records):
     assert "An axis of the robot is mastered off." in text
 
 
+def test_many_parameters_are_folded_away(records):
+    record = records.everything()
+    value = {"value": 0.5, "unit": "deg", "ci95": [0.4, 0.6]}
+    record["effects"] = [{"name": "link_geometry", "parameters": {f"axis_{i}": value for i in range(30)}}]
+    html = page(record)
+    assert "30 parameters, with 95 % intervals" in html
+    assert html.count("0.50 ± 0.10 degrees") == 30
+    assert html.index("0.50 ± 0.10 degrees") > html.index("30 parameters")
+
+
 def test_spots_stand_worst_first_and_marked(records):
     html = page(records.everything())
     table = html[html.index('<div class="spots">') :]

@@ -84,6 +84,29 @@ def test_an_unknown_effect_stays_readable():
     assert in_plain_words("joint_zero beats temperature_c") == "mastering of an axis beats temperature_c"
 
 
+@pytest.mark.parametrize(
+    ("label", "words"),
+    [
+        ("joint_zero axis 3", "mastering of axis 3"),
+        ("gear axis 4", "gear error of axis 4"),
+        ("group_shift column station level S 2", "a shift of station S 2 as a body"),
+        ("gravity_sag axes 2, 3", "sag of axes 2, 3 under weight"),
+        ("link_length parameter a2", "arm length a2"),
+        ("rail external_axis 1", "error along external axis 1"),
+        ("scale", "growth or shrinkage (scale)"),
+        ("rigid transform alone", "rigid transform alone"),
+        ("scale of the drawing", "scale of the drawing"),
+    ],
+)
+def test_labels_of_rivals(label, words):
+    assert effect_noun(label) == words
+
+
+def test_groups_without_a_level():
+    said = finding({"name": "group_shift", "where": {"column": "station"}})
+    assert said == "the groups of column station are shifted against each other"
+
+
 def test_sizes():
     one = {"offset": {"value": -0.12, "unit": "deg"}}
     assert size(one) == "0.12 degrees"

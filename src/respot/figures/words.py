@@ -17,6 +17,7 @@ MOST_IN_A_SENTENCE = 6
 #: Two half widths this close are one.
 _ALIKE = 0.05
 _COMPONENT = re.compile(r"[dt]?_?[xyz](?:_mm)?")
+_LABEL = re.compile(r" (axis|axes|column|level|parameter|external_axis|ids|frame|link|list|reading) ")
 _UNITS = {"deg": "degrees", "degree": "degrees", "1": "", "": "", "percent": "%"}
 
 
@@ -59,7 +60,9 @@ EFFECTS: Mapping[str, EffectWords] = {
         "a wrong frame (tool or base) at {where}",
     ),
     "tool_offset": EffectWords("a TCP that is off", "the TCP is {size}off, by the same amount at every spot"),
-    "scale": EffectWords("growth or shrinkage (scale)", "one list is larger than the other{scaled}, as heat would do"),
+    "scale": EffectWords(
+        "growth or shrinkage (scale)", "the two lists differ in size{scaled}, as after heating or cooling"
+    ),
     "joint_zero": EffectWords(
         "mastering of an axis", "{where} is mastered {size}off", "an axis of the robot", "mastering of {where}"
     ),
@@ -81,7 +84,7 @@ EFFECTS: Mapping[str, EffectWords] = {
     ),
     "gravity_sag": EffectWords(
         "sag of the arm under weight",
-        "{where} sags under the weight of arm and load",
+        "the weight of arm and load makes {where} sag",
         "the arm",
         "sag of {where} under weight",
     ),
@@ -145,8 +148,19 @@ def effect_noun(name: str, where: Mapping[str, Any] | None = None) -> str:
         if spot and words.placed:
             return words.placed.format(where=spot)
         return f"{words.noun} ({spot})" if spot else words.noun
+    if not spot and (labelled := _read_label(name)) is not None:
+        return effect_noun(*labelled)
     text = in_plain_words(name) if " " in name else name.replace("_", " ")
     return f"{text} ({spot})" if spot else text
+
+
+def _read_label(text: str) -> tuple[str, dict[str, str]] | None:
+    """Read the short text that rivals are listed by, ``group_shift column station level S2``; None for free text."""
+    name, _, rest = text.partition(" ")
+    parts = _LABEL.split(f" {rest}")
+    if name not in EFFECTS or len(parts) < 3 or any(not part.strip() for part in parts[1:]) or parts[0].strip():
+        return None
+    return name, dict(zip(parts[1::2], (part.strip() for part in parts[2::2]), strict=True))
 
 
 def in_plain_words(text: str) -> str:
@@ -167,9 +181,10 @@ def place(where: Mapping[str, Any]) -> str:
         if key == "ids":
             parts.append(f"{'spots' if several and len(value) != 1 else 'spot'} {text}")
         elif key in {"axis", "axes"}:
-            parts.append(f"{'axes' if several and len(value) != 1 else 'axis'} {text}")
+            many = len(value) != 1 if several else "," in text
+            parts.append(f"{'axes' if many else 'axis'} {text}")
         elif key == "parameter":
-            parts.append(f"arm length {text}" if re.fullmatch(r"[abc]\d?", text) else f"parameter {text}")
+            parts.append(f"arm length {text}" if re.fullmatch(r"[abcd]_?\d*", text) else f"parameter {text}")
         elif key == "frame":
             parts.append(f"{text} frame")
         else:
@@ -184,9 +199,12 @@ def finding(effect: Mapping[str, Any]) -> str:
     if words is None:
         return f"the spots follow {effect_noun(name, where)}"
     amount = size(effect.get("parameters") or {})
+    spot = place(where)
+    if name == "group_shift" and "column" in where and where.get("level") is None:
+        return f"the groups of {spot} are shifted against each other"
     blank = f"{amount} " if amount else ""
     scaled = f" by {amount}" if amount else ""
-    return words.sentence.format(where=place(where) or words.somewhere, size=blank, scaled=scaled)
+    return words.sentence.format(where=spot or words.somewhere, size=blank, scaled=scaled)
 
 
 def size(parameters: Mapping[str, Any]) -> str:
