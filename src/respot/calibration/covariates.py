@@ -19,8 +19,11 @@ Role = Literal["time", "counter", "force", "temperature", "group", "approach", "
 #: What a column's name says of its meaning, the first that fits.
 _ROLES: tuple[tuple[Role, re.Pattern[str]], ...] = (
     ("approach", re.compile(r"approach_a([1-7])")),
-    ("counter", re.compile(r"weld.*(since|count|cap)|.*(dress|cap_|kappe|fraes|fräs|schwei[sß]+z).*|caps?|tips?")),
-    ("force", re.compile(r".*(force|kraft|squeeze|press(?!ure_temp)).*|f_n")),
+    (
+        "counter",
+        re.compile(r"(welds?|spots?|punkte)_(since|seit|count|on).*|.*(dress|kappe|fr(ae|ä)s|tip).*|caps?(_.*)?"),
+    ),
+    ("force", re.compile(r".*(force|kraft|squeeze).*|f_n|press(ure)?")),
     ("temperature", re.compile(r".*temp.*")),
     (
         "time",
@@ -29,8 +32,8 @@ _ROLES: tuple[tuple[Role, re.Pattern[str]], ...] = (
     (
         "group",
         re.compile(
-            r".*(station|fixture|vorrichtung|spann|program|prg|folge|session|messreihe|line|zelle|cell).*"
-            r"|(tool|werkzeug|base|basis|wobj|workobject|gun|zange|robot|roboter|side|seite)(_?(no|id|name|nr))?"
+            r"(.*_)?(station|fixture|vorrichtung|spanner|program|programm|prg|folge|session|messreihe|cell|zelle|tool"
+            r"|werkzeug|base|basis|wobj|workobject|gun|zange|robot|roboter|side|seite)(_?(no|id|name|nr))?"
         ),
     ),
 )

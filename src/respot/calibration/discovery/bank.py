@@ -78,6 +78,7 @@ class Bank:
         self.slices = [slice(int(stop - size), int(stop)) for size, stop in zip(sizes, stops, strict=True)]
         columns = np.ascontiguousarray(columns.reshape(3 * self.spots, -1))
         self.raw = np.einsum("ij,ij->j", columns, columns)
+        self._points = points
         points = points - points.mean(axis=0)
         extent = max(float(np.sqrt(np.mean(points**2))), 1e-9)
         self.rigid = np.linalg.qr(jacobian(points / extent).reshape(-1, 6))[0]
@@ -111,6 +112,18 @@ class Bank:
         """Part of each term's columns (RMS, 0 to 1) that no rigid motion imitates, (terms,)."""
         left = np.einsum("ij,ij->j", self.columns, self.columns)
         return np.array([np.sqrt(left[part].sum() / max(float(self.raw[part].sum()), 1e-300)) for part in self.slices])
+
+    def sample(self, most: int, seed: int) -> tuple[Bank, Rows]:
+        """Return a bank of no more than ``most`` spots, and which they are."""
+        if self.spots <= most:
+            return self, np.arange(self.spots)
+        rows = np.sort(np.random.default_rng(seed).permutation(self.spots)[:most])
+        return Bank(self.terms, self.columns.reshape(self.spots, 3, -1)[rows], self._points[rows]), rows
+
+    @cached_property
+    def rough(self) -> NDArray[np.float32]:
+        """Columns in single precision: enough for what chance gains, at half of the time."""
+        return self.columns.astype(np.float32)
 
     def project(self, vectors: Array) -> Array:
         """Vectors (3m, ...) without their rigid part."""

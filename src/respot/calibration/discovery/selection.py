@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +21,11 @@ _LAST = 10.0
 """A term that only describes must be better by this much (as `Selection.criterion`) than one that may be a cause."""
 _BETTER = 0.5
 _CANDIDATES = 12
-_OBVIOUS = 12.0
+OBVIOUS = 12.0
 """Scores beyond this never come by chance: where only yes or no is asked, no permutations are needed."""
 _ROUNDS = 6
+_MOST_PERMUTED = 400
+"""Of more spots as many are drawn: what chance gains at best hardly depends on their number."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,8 +122,16 @@ class Selection:
         return np.where(self.allowed & (gains.ranks > 0) & ~self._taken(state), found, np.inf)
 
     def _taken(self, state: State) -> Mask:
+        """Terms that are in a state, in any form, and covariates whose column a cause in it follows already."""
         keys = {self._keys[index] for index in state.chosen}
-        return np.array([key in keys for key in self._keys])
+        terms = [self.bank.terms[index] for index in state.chosen]
+        owned = {term.own for term in terms if term.own and term.effect != "covariate"}
+        return np.array(
+            [
+                key in keys or (term.effect == "covariate" and term.own in owned)
+                for key, term in zip(self._keys, self.bank.terms, strict=True)
+            ]
+        )
 
     def search(self) -> State:
         """Find the set of terms."""
@@ -151,32 +162,40 @@ class Selection:
             return None
         score = np.where(allowed, scores(gains, state.left, self.free(state)), -np.inf)
         best = float(score.max())
-        if best < _OBVIOUS:
-            chance = self._chance(state, gains_allowed=allowed)
+        if best < OBVIOUS:
+            chance = self._chance(state, allowed)
             if p_value(best, chance) > ALPHA:
                 return None
             limit = float(np.quantile(chance, 1.0 - ALPHA))
         else:
-            limit = _OBVIOUS / 2.0
+            limit = OBVIOUS / 2.0
         criteria = np.where(score >= limit, self.beside(state), np.inf)
         return int(np.argmin(criteria)) if np.isfinite(criteria.min()) else None
 
-    def _chance(self, state: State, gains_allowed: Mask) -> Array:
-        gains = self.bank.gains(state.basis, state.left, self.sigma(state))
-        return largest_by_chance(
-            self.bank, state.basis, state.left, gains, gains_allowed, self.free(state), draws=self.draws, seed=self.seed
-        )
+    def _chance(self, state: State, allowed: Mask) -> Array:
+        """Largest score by chance beside a state, for each draw; of very many spots on a sample of them."""
+        small, rows = self._small
+        basis, left = state.basis, state.left
+        if small is not self.bank:
+            basis = small.basis_of(state.chosen, self.sigma(state))
+            left = small.project(state.left.reshape(-1, 3)[rows].ravel())
+            left = left - basis @ (basis.T @ left)
+        free = max(len(left) - 6 - basis.shape[1], 1)
+        gains = small.gains(basis, left, self.sigma(state))
+        return largest_by_chance(small, basis, left, gains, allowed, free, draws=self.draws, seed=self.seed)
+
+    @cached_property
+    def _small(self) -> tuple[Bank, NDArray[np.intp]]:
+        return self.bank.sample(_MOST_PERMUTED, self.seed)
 
     def chance_of(self, state: State, index: int) -> float:
         """P value of one term of a state, the others given."""
         rest = self.state([i for i in state.chosen if i != index], self.sigma(state))
         gains = self.bank.gains(rest.basis, rest.left, self.sigma(state))
-        allowed = self.allowed & ~self._taken(rest)
         score = float(scores(gains, rest.left, self.free(rest))[index])
-        chance = largest_by_chance(
-            self.bank, rest.basis, rest.left, gains, allowed, self.free(rest), draws=self.draws, seed=self.seed
-        )
-        return p_value(score, chance)
+        if score >= OBVIOUS:
+            return 1.0 / (1.0 + self.draws)
+        return p_value(score, self._chance(rest, self.allowed & ~self._taken(rest)))
 
     def chances(self, state: State) -> Array:
         """P value (terms,) of each term that is not in a state, were it added; 1 for those that cannot be."""
@@ -246,7 +265,7 @@ class Selection:
             for index in state.chosen:
                 rest = self.state([i for i in state.chosen if i != index], self.sigma(state))
                 gains = self.bank.gains(rest.basis, rest.left, self.sigma(state))
-                if scores(gains, rest.left, self.free(rest))[index] >= _OBVIOUS:
+                if scores(gains, rest.left, self.free(rest))[index] >= OBVIOUS:
                     continue
                 chance = self.chance_of(state, index)
                 if chance > worst_p:

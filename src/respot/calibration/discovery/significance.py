@@ -76,7 +76,7 @@ def largest_by_chance(
         inside = basis.T @ drawn
         drawn -= basis @ inside
         totals = np.einsum("ij,ij->j", drawn, drawn)
-        products = bank.columns.T @ drawn
+        products = (bank.rough.T @ drawn.astype(np.float32)).astype(np.float64)
         best = np.full(count, -np.inf)
         for size, members in bank.groups.items():
             use = allowed[members] & (gains.ranks[members] > 0)

@@ -14,7 +14,7 @@ from respot.calibration.observations import Observations
 NAME = "covariate"
 PLAUSIBLE_MM = 5.0
 _SATURATING = (0.08, 0.2, 0.5)
-_PERIODS = (1.5, 2.0, 2.7, 3.5, 4.5, 5.5, 6.5, 7.5, 8.5, 9.5, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0)
+_PERIODS = tuple(0.5 * halves for halves in range(3, 41))
 """Waves over the range of a column."""
 _LEAST_DISTINCT = 5
 

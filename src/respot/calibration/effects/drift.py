@@ -11,7 +11,10 @@ from respot.calibration.observations import Observations
 
 DRIFT, WARMUP = "drift", "warmup"
 PLAUSIBLE_MM, PLAUSIBLE_DEG = 3.0, 0.2
-_SHARES = (0.05, 0.1, 0.2, 0.35, 0.6)
+_SHARES = (0.03, 0.05, 0.08, 0.12, 0.18, 0.27, 0.4, 0.6)
+_SECOND = 4.0
+"""A motor warms faster than the arm: a second time constant is this many times the first."""
+
 """Time constants that are tried, as shares of the measuring time."""
 
 
@@ -26,11 +29,21 @@ def _terms(observations: Observations, name: str) -> list[Term]:
         start, span = float(covariate.values.min()), float(np.ptp(covariate.values))
         if span <= 0.0:
             continue
-        forms = [{}] if name == DRIFT else [{"time_constant": round(span * share, 4)} for share in _SHARES]
+        forms: list[dict[str, float]] = [{}]
+        if name == WARMUP:
+            forms = [{"time_constant": round(span * share, 4)} for share in _SHARES]
         for form in forms:
             own = {"start": start, "span": span, "centre": centre, **form}
             found.append(Term(name, {"column": column}, shift, {**own, "moves": "shift"}, own=column))
             found.append(Term(name, {"column": column}, (*shift, *turn), {**own, "moves": "body"}, own=column))
+            if name == DRIFT:
+                bend = tuple(Parameter(f"{each.name}_bend", each.unit, each.prior) for each in (*shift, *turn))
+                bent = {**own, "power": 2, "moves": "body"}
+                found.append(Term(name, {"column": column}, (*shift, *turn, *bend), bent, own=column))
+            if form:
+                slow = tuple(Parameter(f"{each.name}_slow", each.unit, each.prior) for each in (*shift, *turn))
+                two = {**own, "second_time_constant": _SECOND * form["time_constant"], "moves": "body"}
+                found.append(Term(name, {"column": column}, (*shift, *turn, *slow), two, own=column))
     return found
 
 
@@ -43,6 +56,12 @@ def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
     else:
         share = elapsed / term.form["span"]
     columns = motion_about(observations.positions, share, np.array(term.form["centre"]))
+    if "second_time_constant" in term.form:
+        slow = 1.0 - np.exp(-elapsed / term.form["second_time_constant"])
+        second = motion_about(observations.positions, slow, np.array(term.form["centre"]))
+        return np.concatenate([columns, second], axis=2)
+    if "power" in term.form:
+        return np.concatenate([columns, columns * share[:, None, None] ** (term.form["power"] - 1)], axis=2)
     return columns[:, :, :3] if term.form["moves"] == "shift" else columns
 
 

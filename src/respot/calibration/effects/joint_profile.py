@@ -29,15 +29,18 @@ def _terms(observations: Observations) -> list[Term]:
             continue
         place = {"axis": int(axis) + 1}
         own = {MIDDLE: float(angles.min()) + half, HALF: half}
-        for power in (1, 2, 3):
-            names = tuple(Parameter(f"power_{n}", "deg", PLAUSIBLE_DEG) for n in range(1, power + 1))
+        for power in (1, 2, 3, 4, 6):
+            names = tuple(Parameter(f"power_{n}", "deg", PLAUSIBLE_DEG) for n in range(power + 1))
             found.append(Term(NAME, place, names, {"powers": power, **own}))
         if 2.0 * half >= _WIDE:
             for harmonics in (1, 2, 4):
-                names = tuple(
-                    Parameter(f"{wave}_{n}", "deg", PLAUSIBLE_DEG)
-                    for n in range(1, harmonics + 1)
-                    for wave in ("cos", "sin")
+                names = (
+                    Parameter("power_0", "deg", PLAUSIBLE_DEG),
+                    *(
+                        Parameter(f"{wave}_{n}", "deg", PLAUSIBLE_DEG)
+                        for n in range(1, harmonics + 1)
+                        for wave in ("cos", "sin")
+                    ),
                 )
                 found.append(Term(NAME, place, names, {"harmonics": harmonics}))
     return found
@@ -49,10 +52,11 @@ def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
     angles = observations.joints[:, axis]
     if "powers" in term.form:
         even = (angles - term.form[MIDDLE]) / term.form[HALF]
-        values = [even**n for n in range(1, term.form["powers"] + 1)]
+        values = [even**n for n in range(term.form["powers"] + 1)]
     else:
         turns = np.radians(angles)
-        values = [wave(n * turns) for n in range(1, term.form["harmonics"] + 1) for wave in (np.cos, np.sin)]
+        waves = [wave(n * turns) for n in range(1, term.form["harmonics"] + 1) for wave in (np.cos, np.sin)]
+        values = [np.ones_like(turns), *waves]
     columns = np.zeros((*observations.joints.shape, len(values)))
     columns[:, axis] = np.stack(values, axis=-1)
     return columns
@@ -61,7 +65,7 @@ def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
 def _remedy(term: Term, values: NDArray[np.float64]) -> Remedy:
     axis = term.where["axis"]
     text = (
-        f"The error of axis {axis} changes with its angle, by up to about {np.abs(values).sum():.3f} degrees over the "
+        f"The error of axis {axis} changes with its angle, by up to about {np.abs(values[1:]).sum():.3f} degrees over the "
         "range of these spots. Look at the gear ratio and the counterbalance of this axis (gas pressure, spring); if "
         "they are in order, correct the points."
     )

@@ -11,7 +11,10 @@ from respot.calibration.observations import Observations
 
 NAME = "rail"
 PLAUSIBLE_MM, PLAUSIBLE_DEG = 5.0, 0.2
-_FORMS = ("direction", "straightness", "angles", "all")
+_FORMS = ("direction", "straightness", "angles", "all", "fine")
+_POWERS = {"straightness": (2, 3), "all": (2, 3), "fine": (2, 3, 4, 5, 6)}
+_TURNS = {"angles": (1,), "all": (1,), "fine": (1, 2, 3)}
+"""Powers of the travel from the middle: how the rail bows, and how it pitches, rolls and yaws."""
 
 
 def _terms(observations: Observations) -> list[Term]:
@@ -25,12 +28,12 @@ def _terms(observations: Observations) -> list[Term]:
         middle, half = float(travel.min() + np.ptp(travel) / 2.0), float(np.ptp(travel) / 2.0)
         for form in _FORMS:
             names: tuple[Parameter, ...] = ()
-            if form in ("direction", "all"):
+            if form in ("direction", "all", "fine"):
                 names += vector("direction_", "mm", PLAUSIBLE_MM)
-            if form in ("straightness", "all"):
-                names += vector("bow_", "mm", PLAUSIBLE_MM) + vector("bend_", "mm", PLAUSIBLE_MM)
-            if form in ("angles", "all"):
-                names += tuple(Parameter(n, "deg", PLAUSIBLE_DEG) for n in ("turn_x", "turn_y", "turn_z"))
+            for power in _POWERS.get(form, ()):
+                names += vector(f"power_{power}_", "mm", PLAUSIBLE_MM)
+            for power in _TURNS.get(form, ()):
+                names += tuple(Parameter(f"turn_{power}_{way}", "deg", PLAUSIBLE_DEG) for way in "xyz")
             own = {"form": form, "middle": middle, "half": half}
             found.append(Term(NAME, {"external_axis": axis + 1}, names, own, own=f"e{axis + 1}"))
     return found
@@ -42,14 +45,13 @@ def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
     even = (travel - term.form["middle"]) / term.form["half"]
     form = term.form["form"]
     columns = []
-    if form in ("direction", "all"):
+    if form in ("direction", "all", "fine"):
         columns.append(along(even))
-    if form in ("straightness", "all"):
-        columns += [along(even**2), along(even**3)]
-    if form in ("angles", "all"):
+    columns += [along(even**power) for power in _POWERS.get(form, ())]
+    if form in _TURNS:
         foot = np.broadcast_to(np.asarray(observations.base2source.translation), observations.positions.shape)
         turning = np.radians(np.cross(np.eye(3)[None], (observations.positions - foot)[:, None, :]))
-        columns.append(even[:, None, None] * np.swapaxes(turning, 1, 2))
+        columns += [even[:, None, None] ** power * np.swapaxes(turning, 1, 2) for power in _TURNS[form]]
     return np.concatenate(columns, axis=2)
 
 

@@ -210,7 +210,7 @@ def _best_start(source: Array, reference: Array, known: Mask) -> Array:
             lefts.append(left)
             costs.append(np.where(known[:, row] & (cost >= 0.0), cost, np.inf))
     best = np.argmin(np.array(costs), axis=0)
-    return np.array(lefts)[best, np.arange(len(best))]
+    return np.asarray(np.array(lefts)[best, np.arange(len(best))], dtype=np.float64)
 
 
 def _conjugating(first: Array, second: Array, known: Mask) -> Array:
