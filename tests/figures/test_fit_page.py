@@ -92,7 +92,7 @@ def text_of(record: dict[str, Any], **more: Any) -> str:
         "At the robot consistent with for: mastering of axis 3 Master axis 3 again at its mark",
         "never both",
         "Mastering of axis 1 100 %",
-        "93 % rigid and mastering of an axis The same spots near and far from the robot.",
+        "93 % shift and turn and mastering of an axis The same spots near and far from the robot.",
         "12 more spots needed",
         "Twelve spots with the elbow down.",
         "What is left is larger than the noise and follows temperature_c.",

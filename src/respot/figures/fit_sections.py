@@ -427,7 +427,7 @@ def _absorber(by: Any) -> str:
     if not by:
         return "-"
     names = by if isinstance(by, list | tuple) else [by]
-    return listing(effect_noun(str(name)) for name in names)
+    return listing("shift and turn" if name in {"rigid", "registration"} else effect_noun(str(name)) for name in names)
 
 
 def spot_rows(record: Record, tolerance: float) -> dict[str, Any]:
