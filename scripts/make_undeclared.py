@@ -17,9 +17,14 @@ ROOT = Path(__file__).resolve().parent.parent / "samples" / "undeclared"
 #: Beside the truth files this is the only place that says what is hidden.
 LINES: dict[str, dict[str, Any]] = {
     "line_a": {"robot": "kr210_r2700_extra", "spots": 120, "effects": ["joint_zero@3:1.6"], "seed": 71},
-    "line_b": {"robot": "kr210_r2700_2", "spots": 140, "effects": ["group_shift@station:1", "tip_wear:0.9"], "seed": 72},
+    "line_b": {
+        "robot": "kr210_r2700_2",
+        "spots": 140,
+        "effects": ["group_shift@station:1", "tip_wear:0.9"],
+        "seed": 72,
+    },
     "line_c": {"robot": "kr210_r3100_ultra", "spots": 96, "effects": ["gravity_sag:1.3"], "seed": 73},
-}  # fmt: skip
+}
 
 
 def files() -> dict[Path, bytes]:

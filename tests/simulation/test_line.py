@@ -168,6 +168,18 @@ def test_the_programmed_line(robot, layout, spots, rail):
         assert np.ptp(line.positions, axis=0)[1] > 1000
 
 
+@pytest.mark.parametrize("layout", ["easy", "hard"])
+def test_no_two_columns_of_names_make_the_same_group(layout):
+    for seed in range(10):
+        line = simulate(spots=50, seed=seed, layout=layout)
+        groups = {}
+        for column in ("station", "fixture", "program", "session", "operator"):
+            for level in np.unique(line.columns[column].astype(str)):
+                inside = (line.columns[column] == level).tobytes()
+                assert inside not in groups, f"{column} {level} is {groups[inside]}"
+                groups[inside] = f"{column} {level}"
+
+
 def test_easy_and_hard_lines_differ_where_they_should():
     def spread(line):
         """Spread of the stations in space beside that of all spots, and whether the clock follows the path."""

@@ -126,6 +126,25 @@ def test_status_and_turn_are_those_of_the_joints(made, tmp_path):
     assert len(record["edits"]) >= 80
 
 
+@pytest.mark.parametrize("robot", ["irb6640_185_280", "irb6700_200_260", "irb6700_235_265"])
+def test_an_abb_backup_is_the_programmed_line(tmp_path, robot):
+    folder = tmp_path / "line"
+    assert respot("simulate", folder, "--robot", robot, "--spots", 60, "--seed", 5).exit_code == 0
+    made = simulate(robot, spots=60, seed=5)
+    source = read_source(folder / "backup", reference_ids=made.ids)
+    assert not source.issues
+    named = [made.ids.index(spot) for spot in source.spots.ids]
+    assert sorted(named) == list(range(60))
+    assert source.spots.positions == pytest.approx(made.positions[named], abs=1e-5)
+    assert np.degrees((source.spots.rotations.inv() * made.rotations[named]).magnitude()).max() < 1e-6
+    theory = tmp_path / "theory.csv"
+    rows_ = [[spot, *(f"{value + 2:.4f}" for value in xyz)] for spot, xyz in zip(made.ids, made.positions, strict=True)]
+    theory.write_text("\n".join(",".join(row) for row in [["id", "x", "y", "z"], *rows_]) + "\n")
+    result = respot("convert", folder / "backup", "--theory", theory, "-o", tmp_path / "out", "--json")
+    assert result.exit_code == 0, result.stderr  # confdata and joint bounds are understood
+    assert len(json.loads(result.stdout)["edits"]) >= 120
+
+
 def test_a_rail_is_read_with_its_axis(tmp_path):
     assert respot("simulate", tmp_path / "line", "--spots", 30, "--rail", "--seed", 2).exit_code == 0
     source = read_source(tmp_path / "line" / "backup")
@@ -161,7 +180,7 @@ def test_the_same_command_writes_the_same_bytes(made, tmp_path):
     [
         (["--effect", "joint_zer"], "did you mean joint_zero"),
         (["--robot", "kr210_r2700_extr"], "did you mean kr210_r2700_extra"),
-        (["--robot", "irb6640_185_280"], "KUKA"),
+        (["--robot", "irb6640_185_280", "--rail"], "take a KUKA robot"),
         (["--layout", "medium"], "easy or hard"),
         (["--effect", "gear:0"], "no size"),
     ],

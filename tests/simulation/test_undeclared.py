@@ -12,6 +12,8 @@ import pytest
 from respot.simulation import EFFECTS
 
 ROOT = Path(__file__).parents[2]
+#: Effects whose names are words that files hold anyway.
+WORDS = {"gear", "convention"}
 LINES = ROOT / "samples" / "undeclared"
 
 
@@ -32,4 +34,4 @@ def test_each_line_hides_what_its_truth_says(name):
     assert {"measured.csv", "robot.toml", "am.ini", "$config.dat"} <= {path.name for path in files}
     for path in files:
         content = path.read_bytes().decode("cp1252").lower()
-        assert not [effect for effect in EFFECTS if len(effect) > 5 and effect in content], path
+        assert not [effect for effect in EFFECTS if effect in content and effect not in WORDS], path

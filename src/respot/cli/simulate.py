@@ -69,7 +69,7 @@ def run(
 
         def show() -> None:
             typer.echo(f"{outdir}: {spots} spots, noise {noise:g} mm per coordinate, seed {seed}")
-            typer.echo("  backup/         what the robot has: programs, frames, machine data (KUKA KRC4)")
+            typer.echo("  backup/         what the robot has: programs, frames, machine data")
             typer.echo("  programmed.csv  the same spots as a table, with joints")
             typer.echo(
                 "  measured.csv    where they really are, in the tracker's own frame, and what the plant recorded"

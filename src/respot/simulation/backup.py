@@ -1,24 +1,12 @@
-"""A KRC4-like backup of a simulated line: programs, frames, machine data, as an archive of the controller has them."""
+"""All files of a simulated line: the backup of its robot, the tables, the truth."""
 
 from __future__ import annotations
 
-import uuid
-from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
-
-import numpy as np
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from scipy.spatial.transform import Rotation
-
-from respot.simulation.arm import Floats, apply, forward
+from respot.simulation.krl import kuka_files
 from respot.simulation.line import Line
-from respot.simulation.robots import ROBOTS
+from respot.simulation.programs import templates
+from respot.simulation.rapid import abb_files
 from respot.simulation.tables import measured_csv, programmed_csv, truth_json
-
-_TOOL_NAME, _BASE_NAME = "SZ_X01_SERVO", "KAROSSE LI"
-#: Where the fixture stands in the world [mm, deg].
-_BASE = (1420.0, -815.5, 310.25, 0.85, -0.32, 0.14)
 
 
 def files_of(line: Line) -> dict[str, bytes]:
@@ -27,147 +15,24 @@ def files_of(line: Line) -> dict[str, bytes]:
     Raises
     ------
     ValueError
-        The robot's controller is not one that backups are written for.
+        The backup cannot be written: an ABB robot on a rail.
     """
     backup = {f"backup/{path}": content for path, content in backup_files(line).items()}
     texts = {
         "measured.csv": measured_csv(line),
         "programmed.csv": programmed_csv(line),
-        "robot.toml": _templates().get_template("robot.toml.j2").render(name=line.robot["name"], robot=line.robot),
+        "robot.toml": templates().get_template("robot.toml.j2").render(name=line.robot["name"], robot=line.robot),
         "truth.json": truth_json(line),
     }
     return {**backup, **{path: text.encode("utf-8") for path, text in texts.items()}}
 
 
 def backup_files(line: Line) -> dict[str, bytes]:
-    """Files of the backup, CRLF and in the controller's code page.
+    """Files of the backup of the robot, as its maker's controller writes them.
 
     Raises
     ------
     ValueError
-        The robot is no KUKA.
+        An ABB robot on a rail: no backup is written for it.
     """
-    if line.robot["maker"] != "kuka":
-        kuka = ", ".join(name for name, robot in ROBOTS.items() if robot.maker == "kuka")
-        raise ValueError(f"backups are written for KUKA robots alone, not {line.robot['name']}: {kuka}")
-    templates = _templates()
-    chance = np.random.default_rng([line.seed, 5309])
-    station = int(chance.integers(11, 40)) * 10
-    rail = line.external_axes is not None
-    programs = _programs(line)
-    named = {"tool_name": _TOOL_NAME, "base_name": _BASE_NAME}
-    robot = {name: real(line.robot[name]) for name in ("a1", "c1", "c2", "c3", "c4")}
-    texts = {
-        "am.ini": templates.get_template("am.ini.j2").render(
-            name=f"ST{station}R01",
-            serial=int(chance.integers(500000, 900000)),
-            guid=str(uuid.UUID(int=int(chance.integers(1 << 62)), version=4)),
-        ),
-        "KRC/R1/cell.src": templates.get_template("cell.src.j2").render(programs=list(programs)),
-        "KRC/R1/System/$config.dat": templates.get_template("config.dat.j2").render(
-            tool=_members("XYZABC", _six(line.flange2tool[:3, 3], line.flange2tool[:3, :3])),
-            base=_members("XYZABC", np.array(_BASE)),
-            gun_kg=real(round(line.gun_kg, 1)),
-            gun_centre=_members("XYZ", np.round(line.gun_centre, 1)),
-            home_e1="1800.00" if rail else "0.0",
-            **named,
-        ),
-        "KRC/R1/Mada/$machine.dat": templates.get_template("machine.dat.j2").render(
-            limits=[[real(low), real(high)] for low, high in line.robot["limits_deg"]],
-            trafo=line.robot["trafo"],
-            minus_a2=real(-line.robot["a2"]),
-            rail=rail,
-            **robot,
-        ),
-    }
-    for name, rows in programs.items():
-        values = {"name": name, "rel": int(chance.integers(20, 140)), "spots": _spots(line, rows), **named}
-        for kind in ("src", "dat"):
-            path = f"KRC/R1/Program/{name}.{kind}"
-            texts[path] = templates.get_template(f"program.{kind}.j2").render(values)
-    return {path: text.replace("\n", "\r\n").encode("cp1252") for path, text in texts.items()}
-
-
-def real(value: float) -> str:
-    """Print a REAL as a controller does: float32, six digits where they suffice, else nine."""
-    single = np.float32(value)
-    if single == 0:
-        return "0.0"
-    short = f"{single:#.6g}"
-    return short if np.float32(short) == single else f"{single:#.9g}"
-
-
-def _templates() -> Environment:
-    """Return Jinja with the markers of robot code; a name that nothing fills is an error."""
-    return Environment(
-        loader=FileSystemLoader(Path(__file__).parent / "templates"),
-        variable_start_string="<<",
-        variable_end_string=">>",
-        block_start_string="<%",
-        block_end_string="%>",
-        comment_start_string="<#",
-        comment_end_string="#>",
-        undefined=StrictUndefined,
-        keep_trailing_newline=True,
-        autoescape=False,  # noqa: S701 - robot code, not HTML
-    )
-
-
-def _programs(line: Line) -> dict[str, list[int]]:
-    """Spots of each program, in the order of the path."""
-    if "program" not in line.columns:
-        return {"spots": [int(row) for row in np.argsort(line.order)]}
-    programs: dict[str, list[int]] = {}
-    for row in np.argsort(line.order):
-        programs.setdefault(str(line.columns["program"][row]), []).append(int(row))
-    return programs
-
-
-def _spots(line: Line, rows: Sequence[int]) -> list[dict[str, Any]]:
-    """What the templates print of the spots of one program."""
-    spec = ROBOTS[line.robot["name"]]
-    tool, turn = line.flange2tool[:3, 3], line.flange2tool[:3, :3]
-    rail = np.zeros(line.n) if line.external_axes is None else line.external_axes[:, 0]
-    foot = np.column_stack([np.zeros(line.n), rail, np.zeros(line.n)])
-    frames = forward(spec, line.approach_joints, root_at=foot)
-    via = frames.flange_at + apply(frames.flange, tool)
-    forces = line.columns["force_n"].astype(float) if "force_n" in line.columns else np.full(line.n, 2600.0)
-    matrices = line.rotations.as_matrix()
-    return [
-        {
-            "id": line.ids[row],
-            "via": f"P{10 * number}",
-            "via_pose": _e6pos(via[row], frames.flange[row] @ turn, line.approach_joints[row], rail[row], line),
-            "pose": _e6pos(line.positions[row], matrices[row], line.joints[row], rail[row], line),
-            "weld": int(10 + round(forces[row] / 500)),
-            "force": real(round(forces[row] / 1000, 2)),
-        }
-        for number, row in enumerate(rows, start=1)
-    ]
-
-
-def _six(at: Floats, turn: Floats) -> Floats:
-    return np.concatenate([at, Rotation.from_matrix(turn).as_euler("ZYX", degrees=True)])
-
-
-def _members(names: str, values: Floats) -> str:
-    return ",".join(f"{name} {real(value)}" for name, value in zip(names, values, strict=True))
-
-
-def _e6pos(at: Floats, turn: Floats, joints: Floats, rail: float, line: Line) -> str:
-    """Members of an E6POS in the fixture's base, with all nine digits, so that base times point stays exact."""
-    base = Rotation.from_euler("ZYX", _BASE[3:], degrees=True)
-    local = _six(base.inv().apply(at - np.array(_BASE[:3])), (base.inv() * Rotation.from_matrix(turn)).as_matrix())
-    shown = ",".join(f"{name} {np.float32(value):#.9g}" for name, value in zip("XYZABC", local, strict=True))
-    status, turns = _status_turn(joints, line)
-    return f"{shown},S {status},T {turns},E1 {real(rail)},E2 0.0,E3 0.0,E4 0.0,E5 0.0,E6 0.0"
-
-
-def _status_turn(joints: Floats, line: Line) -> tuple[int, int]:
-    """Status and Turn: wrist behind axis 1, elbow above its stretched angle, axis 5 negative; axes below zero."""
-    robot = line.robot
-    upper, fore = np.radians(joints[1]), np.radians(joints[1] + joints[2])
-    wrist = robot["a1"] + robot["c2"] * np.cos(upper) + robot["c3"] * np.cos(fore) - robot["a2"] * np.sin(fore)
-    above = np.radians(joints[2]) > -np.arctan2(robot["a2"], robot["c3"])
-    status = int(wrist < 0) + 2 * int(above) + 4 * int(joints[4] < 0)
-    return status, sum(1 << axis for axis, angle in enumerate(joints) if angle < 0)
+    return kuka_files(line) if line.robot["maker"] == "kuka" else abb_files(line)

@@ -202,13 +202,11 @@ def _surface(robot: RobotSpec, place: Floats, rng: np.random.Generator) -> Float
 
 
 def _programs(station: Ints, spots: int, hard: bool, rng: np.random.Generator) -> Ints:
-    """Programs: on hard lines one or two for each station, on easy ones any spots."""
-    if not hard:
-        programs = int(rng.integers(3, 5))
-        return np.asarray(rng.permutation(np.repeat(np.arange(programs), uneven(rng, spots, programs))))
-    half = rng.random(spots) < 0.5
-    names = np.unique(2 * station + (half & (station % 2 == 0)), return_inverse=True)[1]
-    return np.asarray(names, dtype=np.int64)
+    """Programs: on hard lines each welds some of two stations, on easy ones any spots; none is just a station."""
+    if hard:
+        return np.asarray((station + (rng.random(spots) < 0.5)) % (int(station.max()) + 1), dtype=np.int64)
+    programs = int(rng.integers(3, 5))
+    return np.asarray(rng.permutation(np.repeat(np.arange(programs), uneven(rng, spots, programs))))
 
 
 def _path(program: Ints, positions: Floats, rng: np.random.Generator) -> Ints:
