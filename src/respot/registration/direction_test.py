@@ -25,7 +25,7 @@ from respot.registration.rigid import fit_rigid
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-LEAST_WITNESSES = 7
+LEAST_WITNESSES = 6
 """Fewer residuals do not tell the noise of three directions."""
 _MANY = 1000  # inliers; of more the prediction is certain beside the noise, and one pair does not move it
 
@@ -55,7 +55,7 @@ def direction_excess(source: Array, reference: Array, inliers: Mask) -> Array:
     Raises
     ------
     RegistrationError
-        ``TOO_FEW_PAIRS`` for fewer than 8 inliers.
+        ``TOO_FEW_PAIRS`` for fewer than 7 inliers.
     DegenerateError
         The inliers lie on a line.
     """

@@ -124,8 +124,9 @@ def judged_by_direction(fit: RobustFit, source: Array, reference: Array, *, seed
     """Judge anew with each direction's own noise, where that changes a verdict and the noise is not a sphere.
 
     Spots are spaced by hand along a flange: by the length of residuals good ones along it are put out, so that
-    intervals along it come out too narrow, and bad ones across it stay in. The inliers of the plain test are tested for
-    noise that is the same along all axes (`respot.registration.anisotropy.isotropy_p_value`, below 0.01).
+    intervals along it come out too narrow, and bad ones across it stay in. The inliers that the directions tell are
+    tested for noise that is the same along all axes (`respot.registration.anisotropy.isotropy_p_value`, below 0.01):
+    of the widest direction the plain test has cut off what makes it wide.
 
     Parameters
     ----------
@@ -138,7 +139,7 @@ def judged_by_direction(fit: RobustFit, source: Array, reference: Array, *, seed
     step = _step(len(source))
     sample, target, core = source[::step], reference[::step], fit.inliers[::step]
     inliers = settle_by_direction(sample, target, core)
-    if np.array_equal(inliers, core) or isotropy_p_value(sample[core], target[core], seed=seed) >= SIGNIFICANCE:
+    if np.array_equal(inliers, core) or _alike(sample[inliers], target[inliers], seed):
         return fit
     try:
         near = fit_rigid(sample, target, inliers.astype(np.float64)).residuals[inliers]
@@ -151,6 +152,14 @@ def judged_by_direction(fit: RobustFit, source: Array, reference: Array, *, seed
     plain = _robust_fit(rigid, inliers, fit.start)
     limit = float(direction_limit(noise[None], np.array([len(near)]))[0])
     return replace(plain, threshold=float(np.sqrt(limit * np.linalg.eigvalsh(noise)[2])), by_direction=True)
+
+
+def _alike(source: Array, reference: Array, seed: int) -> bool:
+    """Whether noise that is the same along all axes explains what a fit of these pairs leaves."""
+    try:
+        return isotropy_p_value(source, reference, seed=seed) >= SIGNIFICANCE
+    except RegistrationError:
+        return True
 
 
 def _step(n: int) -> int:
