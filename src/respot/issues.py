@@ -81,7 +81,13 @@ CODES: dict[str, tuple[Level, str]] = {
     "ORIENTATIONS_TURNED": (_W, "the tool frames of two lists differ by a constant turn"),
     "ORIENTATION_CONVENTION": (_W, "orientations of one list are probably written in another convention"),
     "ORIENTATIONS_DISAGREE": (_W, "orientations of two lists do not mean the same tool directions"),
+    "JOINTS_NOT_USED": (_W, "joints are not known, or do not belong to the poses: the arm's effects are not tried"),
+    "COLUMN_NOT_USED": (_I, "a column of a table cannot be used to explain residuals"),
+    "EFFECT_FOUND": (_W, "the residual follows an effect that the rigid transform lacks"),
+    "UNEXPLAINED": (_W, "structure is left that no effect explains"),
+    "ABSOLUTE_ACCURACY": (_W, "the controller compensates the arm's own errors: effects of the arm are refused"),
     # using a stored calibration
+    "EFFECT_LEFT_OUT": (_W, "a column that an effect follows is not known: the effect is left out"),
     "ANOTHER_ROBOT": (_E, "a calibration was fitted to another robot"),
     "ANOTHER_SOURCE": (_W, "a calibration is used on another source than it was fitted to"),
     "NO_ORIENTATION": (_E, "orientations are needed and not known"),

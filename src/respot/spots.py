@@ -65,6 +65,8 @@ class Source:
         None for a table.
     robot : Robot or None
         The robot of the backup that the spots are of.
+    table : Table or None
+        The table; None for a backup.
     """
 
     path: Path
@@ -72,6 +74,7 @@ class Source:
     sha256: str
     backup: Backup | None = None
     robot: Robot | None = None
+    table: Table | None = None
 
     @property
     def issues(self) -> list[Issue]:
@@ -113,7 +116,7 @@ def read_source(
     """
     if not is_backup(path):
         table = read_table(path)
-        return Source(path, spots_of_table(table), table.sha256)
+        return Source(path, spots_of_table(table), table.sha256, table=table)
     backup = open_backup(path, [read_profile(profile) for profile in profiles])
     robot = backup.robot(robot_name)
     return Source(path, spots_of_robot(robot, reference_ids, spot_id), backup.sha256, backup, robot)

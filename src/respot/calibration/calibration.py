@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -14,6 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from respot.calibration.effects.catalogue import MECHANISMS
+from respot.calibration.effects.moved import missing, moved, unmoved
+from respot.calibration.effects.term import Term
+from respot.calibration.observations import Observations
 from respot.calibration.precision import Precision
 from respot.registration.rigid import homogeneous
 
@@ -25,6 +29,8 @@ Method = Literal["robust", "paper"]
 SCHEMA = "respot.calibration/1"
 SCHEMA_WITH_TOOL = "respot.calibration/2"
 """Of calibrations with a tool offset: a reader that knows version 1 only would leave it out, and must not read them."""
+SCHEMA_WITH_EFFECTS = "respot.calibration/3"
+"""Of calibrations with other effects."""
 
 _ORTHOGONAL = 1e-9
 #: What provenance says of the source, and the same of the reference.
@@ -38,7 +44,8 @@ class CalibrationError(ValueError):
     ----------
     code : str
         ``CALIBRATION_UNREADABLE``, ``CALIBRATION_SCHEMA``, ``CALIBRATION_INCOMPLETE``, ``CALIBRATION_CHANGED``,
-        ``CALIBRATION_NOT_RIGID``, ``CALIBRATION_FRAMES`` or ``CALIBRATION_NEEDS_ORIENTATION``.
+        ``CALIBRATION_NOT_RIGID``, ``CALIBRATION_FRAMES``, ``CALIBRATION_NEEDS_ORIENTATION``, or ``CALIBRATION_EFFECTS``
+        for what a calibration with effects needs or cannot do.
     """
 
     def __init__(self, code: str, message: str) -> None:
@@ -48,9 +55,10 @@ class CalibrationError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """The model ``reference = rotation @ (source + tool @ tool_offset) + translation`` and where it came from.
+    """The model ``reference = rotation @ effects(source + tool @ tool_offset) + translation`` and where it came from.
 
-    ``tool`` is the tool's orientation in the source frame; without a tool offset it plays no part.
+    ``tool`` is the tool's orientation in the source frame; without a tool offset it plays no part. Of effects there are
+    any number; `respot.calibration.effects.moved` says how they move a spot.
 
     Attributes
     ----------
@@ -70,6 +78,11 @@ class Calibration:
         How it was fitted. An unconstrained (affine) solution is no calibration: it is no rigid motion.
     tool_offset : (3,) array or None
         By how much the TCP is wrong, in the tool frame [mm].
+    terms, values : tuples of equal length
+        Effects beside, and the values of their parameters. A calibration with them needs to know more of a spot than
+        its pose.
+    robot : mapping or None
+        Kinematics that the effects of the arm were fitted with, as `respot.kinematics.robot_file.robot_record`.
     precision : Precision or None
         How sure it is: not part of the content hash, and kept by a hash of its own in the file. None where nobody said.
 
@@ -89,6 +102,9 @@ class Calibration:
     method: Method = "robust"
     tool_offset: Array | None = None
     precision: Precision | None = None
+    terms: tuple[Term, ...] = ()
+    values: tuple[Array, ...] = ()
+    robot: Mapping[str, Any] | None = None
 
     def __post_init__(self) -> None:
         rotation, translation = np.array(self.rotation, dtype=np.float64), np.array(self.translation, dtype=np.float64)
@@ -106,8 +122,14 @@ class Calibration:
             values["tool_offset"] = np.array(self.tool_offset, dtype=np.float64)
             if values["tool_offset"].shape != (3,) or not np.isfinite(values["tool_offset"]).all():
                 raise CalibrationError("CALIBRATION_INCOMPLETE", "the tool offset must be 3 finite numbers")
-        if self.precision is not None and self.precision.parameters != (6 if self.tool_offset is None else 9):
-            message = "the covariance must be 6 x 6, and 9 x 9 with a tool offset"
+        sizes = [len(term.parameters) for term in self.terms]
+        if [np.shape(value) for value in self.values] != [(size,) for size in sizes]:
+            raise CalibrationError("CALIBRATION_INCOMPLETE", "an effect does not have one value for each parameter")
+        if not all(np.isfinite(value).all() for value in self.values):
+            raise CalibrationError("CALIBRATION_INCOMPLETE", "a value of an effect is no finite number")
+        parameters = (6 if self.tool_offset is None else 9) + sum(sizes)
+        if self.precision is not None and self.precision.parameters != parameters:
+            message = f"the covariance must be {parameters} x {parameters}: the rigid part and what effects there are"
             raise CalibrationError("CALIBRATION_INCOMPLETE", message)
         for name, value in values.items():
             value += 0.0  # no negative zero: it would print, and hash, differently
@@ -119,7 +141,9 @@ class Calibration:
         """The rotation and translation as scipy object; a tool offset comes before it."""
         return RigidTransform.from_matrix(homogeneous(self.rotation, self.translation))
 
-    def predict(self, points: ArrayLike, rotations: Rotation | None = None) -> tuple[Array, Rotation | None]:
+    def predict(
+        self, points: ArrayLike, rotations: Rotation | None = None, observations: Observations | None = None
+    ) -> tuple[Array, Rotation | None]:
         """Source poses in the reference frame.
 
         Parameters
@@ -128,6 +152,8 @@ class Calibration:
             Source frame [mm].
         rotations : Rotation of n, optional
             Tool orientations in the source frame; turned with the points.
+        observations : Observations of n, optional
+            What else is known of the spots: needed for a calibration with effects. Its poses are not looked at.
 
         Returns
         -------
@@ -137,7 +163,8 @@ class Calibration:
         Raises
         ------
         CalibrationError
-            ``CALIBRATION_NEEDS_ORIENTATION`` for a calibration with a tool offset and no orientations.
+            ``CALIBRATION_NEEDS_ORIENTATION`` for a calibration with a tool offset and no orientations;
+            ``CALIBRATION_EFFECTS`` for one with effects that the observations do not let be computed.
         """
         given = np.asarray(points, dtype=np.float64)
         if self.tool_offset is not None:
@@ -145,14 +172,87 @@ class Calibration:
                 message = "the calibration has a tool offset: it moves a spot by its orientation, which is not known"
                 raise CalibrationError("CALIBRATION_NEEDS_ORIENTATION", message)
             given = given + rotations.as_matrix() @ self.tool_offset
-        moved = given @ self.rotation.T + self.translation
-        return moved, None if rotations is None else Rotation.from_matrix(self.rotation) * rotations
+        if self.terms:
+            given, rotations = moved(self._seen(given, rotations, observations), self.terms, self.values)
+        there = given @ self.rotation.T + self.translation
+        return there, None if rotations is None else Rotation.from_matrix(self.rotation) * rotations
+
+    def effect_columns(self, observations: Observations) -> Array:
+        """Shift (n, 3, k) of each spot per unit of each parameter of the effects, reference frame."""
+        shifts = [MECHANISMS[term.effect].shifts(observations, term) for term in self.terms]
+        return np.asarray(self.rotation @ np.concatenate(shifts, axis=2))
+
+    def unpredict(self, points: ArrayLike, rotations: Rotation | None, observations: Observations | None) -> Array:
+        """Source positions (n, 3) that are predicted to lie at ``points`` (n, 3) in the reference frame [mm].
+
+        The spots keep their joints, orientations and columns. To 1e-9 mm.
+
+        Parameters
+        ----------
+        points : (n, 3) array
+            Reference frame [mm].
+        rotations : Rotation of n, optional
+            Tool orientations in the *source* frame.
+        observations : Observations of n, optional
+            As `predict`.
+
+        Raises
+        ------
+        CalibrationError
+            As `predict`.
+        """
+        wanted = (np.asarray(points, dtype=np.float64) - self.translation) @ self.rotation
+        if self.terms:
+            wanted = unmoved(self._seen(wanted, rotations, observations), self.terms, self.values, wanted)
+        if self.tool_offset is not None:
+            if rotations is None:
+                message = "the calibration has a tool offset: it moves a spot by its orientation, which is not known"
+                raise CalibrationError("CALIBRATION_NEEDS_ORIENTATION", message)
+            wanted = wanted - rotations.as_matrix() @ self.tool_offset
+        return wanted
+
+    def _seen(self, points: Array, rotations: Rotation | None, observations: Observations | None) -> Observations:
+        if observations is None or len(observations) != len(points):
+            names = ", ".join(term.label for term in self.terms)
+            message = f"the calibration has effects ({names}): what they follow must be known of each spot"
+            raise CalibrationError("CALIBRATION_EFFECTS", message)
+        lacking = [term for term in self.terms if missing(observations, term)]
+        if lacking:
+            names = ", ".join(f"{term.label} needs {missing(observations, term)}" for term in lacking)
+            raise CalibrationError("CALIBRATION_EFFECTS", names)
+        return replace(observations, positions=points, rotations=rotations)
+
+    def without(self, left_out: Collection[Term]) -> Calibration:
+        """Return the calibration without some of its effects: what they did not tell of is as where they are zero."""
+        keep = [place for place, term in enumerate(self.terms) if term not in left_out]
+        stops = np.cumsum([0, *(len(value) for value in self.values)]) + 6
+        rows = [*range(6), *(row for place in keep for row in range(stops[place], stops[place + 1]))]
+        sure = self.precision
+        if sure is not None:
+            squares = [sure.effect_scatter[place] for place in range(len(self.terms)) if place not in keep]
+            unknown = np.sum(squares, axis=0) if squares else None
+            scatter = tuple(sure.effect_scatter[place] for place in keep)
+            cut = sure.covariance[np.ix_(rows, rows)]
+            sure = replace(sure, covariance=cut, effect_scatter=scatter, unknown=unknown)
+        kept, values = tuple(self.terms[place] for place in keep), tuple(self.values[place] for place in keep)
+        return replace(self, terms=kept, values=values, precision=sure)
+
+    def _refuse_effects(self, what: str) -> None:
+        if self.terms:
+            message = f"a calibration with effects cannot be {what}: effects hold for spots of its own source"
+            raise CalibrationError("CALIBRATION_EFFECTS", message)
 
     def inverse(self) -> Calibration:
         """Return the calibration from reference to source; kind, frame, ids and method stay, the provenance says so.
 
         The precision goes with it, but for a tool offset: where its fitted spots lie is known in the source frame only.
+
+        Raises
+        ------
+        CalibrationError
+            ``CALIBRATION_EFFECTS`` for a calibration with effects: `unpredict` finds single spots.
         """
+        self._refuse_effects("turned round")
         rotation = self.rotation.T
         return replace(
             self,
@@ -184,6 +284,8 @@ class Calibration:
             ``CALIBRATION_FRAMES`` if it is not known that the frames meet, or if one says where spots should be and the
             other where they went.
         """
+        self._refuse_effects("joined to another")
+        other._refuse_effects("joined to another")
         if self.kind != other.kind:
             message = (
                 f"a {self.kind} and a {other.kind} calibration cannot be one: the first word decides what it means"
@@ -223,7 +325,8 @@ class Calibration:
         return {
             **({} if self.method == "robust" else {"method": self.method}),
             **({} if self.tool_offset is None else {"tool_offset": self.tool_offset.tolist()}),
-            "schema": SCHEMA if self.tool_offset is None else SCHEMA_WITH_TOOL,
+            **(self._effects() if self.terms else {}),
+            "schema": self._schema,
             "kind": self.kind,
             "frame": self.frame,
             "ids": sorted(self.ids),
@@ -231,8 +334,21 @@ class Calibration:
             "translation": self.translation.tolist(),
         }
 
+    @property
+    def _schema(self) -> str:
+        if self.terms:
+            return SCHEMA_WITH_EFFECTS
+        return SCHEMA if self.tool_offset is None else SCHEMA_WITH_TOOL
+
+    def _effects(self) -> dict[str, Any]:
+        pairs = zip(self.terms, self.values, strict=True)
+        return {
+            "effects": [{**term.to_dict(), "values": value.tolist()} for term, value in pairs],
+            "robot": None if self.robot is None else dict(self.robot),
+        }
+
     def to_json(self) -> str:
-        """JSON text of schema `SCHEMA`, or `SCHEMA_WITH_TOOL`; equal calibrations give equal text."""
+        """JSON text of one of the three schemas; equal calibrations give equal text."""
         sure = None if self.precision is None else self.precision.to_dict()
         record = {
             **self._content(),
@@ -257,7 +373,7 @@ class Calibration:
         """
         record = _parse(text)
         try:
-            offset, sure = record.get("tool_offset"), record.get("precision")
+            offset, sure, effects = record.get("tool_offset"), record.get("precision"), record.get("effects", [])
             result = cls(
                 rotation=np.array(record["rotation"], dtype=np.float64),
                 translation=np.array(record["translation"], dtype=np.float64),
@@ -268,6 +384,9 @@ class Calibration:
                 method=record.get("method", "robust"),
                 tool_offset=None if offset is None else np.array(offset, dtype=np.float64),
                 precision=None if sure is None else Precision.from_dict(sure),
+                terms=tuple(_term(each) for each in effects),
+                values=tuple(np.array(each["values"], dtype=np.float64) for each in effects),
+                robot=record.get("robot"),
             )
             stated, kept = record["hash"], None if sure is None else record["precision_hash"]
         except KeyError as error:
@@ -312,6 +431,13 @@ class Calibration:
             raise CalibrationError(error.code, f"{path}: {error}") from error
 
 
+def _term(record: Mapping[str, Any]) -> Term:
+    term = Term.from_dict(record)
+    if term.effect not in MECHANISMS:
+        raise ValueError(f"there is no effect {term.effect!r}")
+    return term
+
+
 def _parse(text: str) -> dict[str, Any]:
     try:
         record = json.loads(text)
@@ -320,11 +446,11 @@ def _parse(text: str) -> dict[str, Any]:
     if not isinstance(record, dict):
         raise CalibrationError("CALIBRATION_UNREADABLE", "not a calibration: the JSON is not an object")
     schema = record.get("schema")
-    if schema not in (SCHEMA, SCHEMA_WITH_TOOL):
+    if schema not in (SCHEMA, SCHEMA_WITH_TOOL, SCHEMA_WITH_EFFECTS):
         found = re.fullmatch(r"respot\.calibration/([0-9]{1,9})", schema) if isinstance(schema, str) else None
         if found is None:
             advice = "not a calibration; save one with `respot fit ... -o CAL.json`"
-        elif int(found[1]) > 2:
+        elif int(found[1]) > 3:
             advice = "made by a newer respot: update this one, or fit it again"
         else:
             advice = "no version that respot ever wrote"

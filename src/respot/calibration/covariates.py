@@ -71,7 +71,7 @@ class Covariate:
     role : str
         What its name says that it is.
     values : (n,) array or None
-        Numbers, NaN where a cell is empty; dates in minutes from the first.
+        Numbers, in every row; dates in minutes.
     labels : tuple of n str or None
         Texts, or numbers of few levels, as levels; empty where a cell is.
     """
@@ -110,7 +110,7 @@ def role_of(name: str) -> Role:
 
 
 def covariates_of(
-    texts: Mapping[str, Sequence[str]], numbers: Mapping[str, Array], skip: Sequence[str]
+    texts: Mapping[str, Sequence[str]], numbers: Mapping[str, Array], skip: Sequence[str], *, constant: bool = False
 ) -> tuple[dict[str, Covariate], dict[str, str]]:
     """Columns that can be used, and why others cannot.
 
@@ -122,6 +122,8 @@ def covariates_of(
         Those that are numbers in every filled cell.
     skip : sequence of str
         Columns that are something else: the ID, the pose.
+    constant : bool
+        Keep columns that are the same everywhere: of no use to find an effect, but to predict by one.
 
     Returns
     -------
@@ -133,7 +135,7 @@ def covariates_of(
     for name, cells in texts.items():
         if not name or name in skip:
             continue
-        made = _covariate(name, list(cells), numbers.get(name))
+        made = _covariate(name, list(cells), numbers.get(name), constant)
         if isinstance(made, str):
             unused[name] = made
         else:
@@ -141,14 +143,14 @@ def covariates_of(
     return found, unused
 
 
-def _covariate(name: str, cells: Sequence[str], values: Array | None) -> Covariate | str:
+def _covariate(name: str, cells: Sequence[str], values: Array | None, constant: bool) -> Covariate | str:
     role = role_of(name)
     filled = [cell for cell in cells if cell.strip()]
     if not filled:
         return "is empty"
     if values is not None:
         distinct = np.unique(values[np.isfinite(values)])
-        if len(distinct) < 2:
+        if len(distinct) < 2 and not constant:
             return f"is the same everywhere ({filled[0]})"
         few = len(distinct) <= _MOST_NUMERIC_LEVELS and np.all(distinct == np.round(distinct))
         labels = (
@@ -159,9 +161,9 @@ def _covariate(name: str, cells: Sequence[str], values: Array | None) -> Covaria
         if labels is None and np.isnan(values).any():
             return f"lacks {int(np.isnan(values).sum())} of its numbers; fill them in to have it tried"
         return Covariate(name, role, None if np.isnan(values).any() else values, labels)
-    if len(set(filled)) < 2:
+    if len(set(filled)) < 2 and not constant:
         return f"is the same everywhere ({filled[0]})"
-    minutes = _minutes(cells)
+    minutes = _minutes(cells, constant)
     if minutes is not None:
         return Covariate(name, "time", minutes, None)
     distinct_texts = set(filled)
@@ -187,8 +189,8 @@ def _looks_like_date(cell: str) -> bool:
     return re.fullmatch(r"\d{1,4}[-./]\d{1,2}[-./]\d{2,4}.*|\d{1,2}:\d{2}.*", cell.strip()) is not None
 
 
-def _minutes(cells: Sequence[str]) -> Array | None:
-    """Dates or times of day as minutes from the earliest; None unless all are written in one and the same way."""
+def _minutes(cells: Sequence[str], constant: bool) -> Array | None:
+    """Dates as minutes since 1970, times of day since midnight; None unless all are written in one and the same way."""
     stripped = [cell.strip() for cell in cells]
     readings = []
     for pattern in _FORMATS:
@@ -196,8 +198,8 @@ def _minutes(cells: Sequence[str]) -> Array | None:
             times = [datetime.strptime(cell, pattern) for cell in stripped]
         except ValueError:
             continue
-        first = min(times)
-        readings.append(np.array([(time - first).total_seconds() / 60.0 for time in times]))
+        start = datetime(1970, 1, 1) if "%d" in pattern else datetime(1900, 1, 1)
+        readings.append(np.array([(time - start).total_seconds() / 60.0 for time in times]))
     if not readings or any(not np.array_equal(readings[0], other) for other in readings[1:]):
         return None
-    return readings[0] if np.ptp(readings[0]) > 0.0 else None
+    return readings[0] if constant or np.ptp(readings[0]) > 0.0 else None

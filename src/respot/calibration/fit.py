@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
+from respot.calibration import effects_model
 from respot.calibration.calibration import Calibration, Frame, Kind
-from respot.calibration.effects import swapped_ids, tool_offset
+from respot.calibration.causes import Causes, Observe, find_causes, names_of
+from respot.calibration.discovery.records import effects_of as discovered_effects
+from respot.calibration.effects import swapped_ids, tool_model, tool_offset
 from respot.calibration.effects.orientations import OrientationFit, compare_orientations
-from respot.calibration.effects.search import RIGID_ONLY, Effects, effects_of, search_effects
+from respot.calibration.effects.search import RIGID_ONLY, Effects
 from respot.calibration.effects.tool_fit import moved_by
-from respot.calibration.effects.tool_model import robust_of, uncertainty_of
 from respot.calibration.effects.tool_robust import fit_tool_robust
 from respot.calibration.methods import affine_fit, paper_fit
+from respot.calibration.observations import Observations
 from respot.calibration.spot_fit import Method, SpotFit
-from respot.calibration.uncertainty import transform_uncertainty, uncertainty_by_direction
+from respot.calibration.uncertainty import TransformUncertainty, transform_uncertainty, uncertainty_by_direction
+from respot.kinematics.robot_file import robot_record
 from respot.registration.affine import fit_affine
 from respot.registration.alternatives import fit_translation
 from respot.registration.anisotropy import isotropy_p_value
@@ -34,6 +39,7 @@ from respot.registration.statistics import residual_directions
 from respot.registration.support import rotation_support
 
 Array = NDArray[np.float64]
+PairedObserve = Callable[[Sequence[int] | NDArray[np.intp], Sequence[int] | NDArray[np.intp]], Observations]
 
 LEAST_PAIRS = 4
 DEFAULT_FRAME: Mapping[Kind, Frame] = {"theory": "same", "measured": "free"}
@@ -54,6 +60,7 @@ def fit_tables(
     source_rotations: Rotation | None = None,
     reference_rotations: Rotation | None = None,
     noise: float | None = None,
+    noise_source: str = "--noise",
     seed: int = 0,
     method: Method = "robust",
     tau: float | None = None,
@@ -61,6 +68,9 @@ def fit_tables(
     matching: Matching = "auto",
     effects: Effects = RIGID_ONLY,
     provenance: Mapping[str, Any] | None = None,
+    observe: PairedObserve | None = None,
+    nested: bool = True,
+    progress: Callable[[], None] = lambda: None,
 ) -> SpotFit:
     """Pair two lists and fit them; parameters and errors as `fit_spots`.
 
@@ -73,6 +83,8 @@ def fit_tables(
     matching : "auto", "id" or "geometry"
         How spots are paired; see `respot.registration.pairing.pair_spots`. Where names and distances disagree and the
         effect ``tool_offset`` is looked for, pairs by name are taken if an offset makes the two lists congruent.
+    observe : callable, optional
+        From rows of source and reference to `respot.calibration.observations.Observations` of the pairs.
 
     Raises
     ------
@@ -84,7 +96,7 @@ def fit_tables(
             raise RegistrationError("SHAPE_MISMATCH", f"{which}: {len(ids)} names for points {np.shape(points)}")
     first, second = np.asarray(source, dtype=np.float64), np.asarray(reference, dtype=np.float64)
     same_frame = (frame or DEFAULT_FRAME[kind]) == "same"
-    looked_for = effects_of(effects)
+    looked_for = names_of(effects)
 
     def pair(points: Array) -> Pairing:
         return pair_spots(source_ids, points, reference_ids, second, way=matching, same_frame=same_frame, seed=seed)
@@ -120,6 +132,7 @@ def fit_tables(
         source_rotations=None if source_rotations is None else source_rotations[match.source_rows],
         reference_rotations=None if reference_rotations is None else reference_rotations[match.reference_rows],
         noise=noise,
+        noise_source=noise_source,
         seed=seed,
         method=method,
         tau=tau,
@@ -128,8 +141,13 @@ def fit_tables(
         provenance=provenance,
         match=match,
         notes=notes,
+        observe=None
+        if observe is None
+        else lambda permutation: observe(match.source_rows, match.reference_rows[permutation]),
+        nested=nested,
+        progress=progress,
     )
-    if doubt is not None and (fit.tool is None or not fit.tool.accepted):
+    if doubt is not None and not any(effect.name == tool_offset.NAME for effect in fit.effects):
         raise doubt
     return fit
 
@@ -165,6 +183,7 @@ def fit_spots(
     source_rotations: Rotation | None = None,
     reference_rotations: Rotation | None = None,
     noise: float | None = None,
+    noise_source: str = "--noise",
     seed: int = 0,
     method: Method = "robust",
     tau: float | None = None,
@@ -173,6 +192,9 @@ def fit_spots(
     provenance: Mapping[str, Any] | None = None,
     match: IdMatch | None = None,
     notes: tuple[Note, ...] = (),
+    observe: Observe | None = None,
+    nested: bool = True,
+    progress: Callable[[], None] = lambda: None,
 ) -> SpotFit:
     """Fit paired spots: names, inliers, rigid transform, and how sure all of it is.
 
@@ -190,6 +212,8 @@ def fit_spots(
         Tool orientations in the reference frame. They are compared, and never move the fit.
     noise : float, optional
         Standard deviation per coordinate, known independently [mm].
+    noise_source : str
+        Where that is known from, for the report.
     seed : int
         Of the consensus start, of permutation draws and of the paper's random subsets.
     method : "robust", "paper" or "affine"
@@ -207,6 +231,12 @@ def fit_spots(
         Where the pairs come from, for the counts and the reference's own names.
     notes : tuple of Note
         What was noticed while pairing.
+    observe : callable, optional
+        What else is known of the pairs: `respot.calibration.causes.Observe`.
+    nested : bool
+        Also choose and fit without each fifth of the spots, to judge what is found by spots that took no part.
+    progress : callable
+        Called as the search for effects goes on.
 
     Raises
     ------
@@ -219,41 +249,32 @@ def fit_spots(
     """
     names = tuple(str(name) for name in ids)
     first, second = _check(names, source, reference)
-    before = fit_rigid(first, second, checked=False)
-    exchanged, trial = search_effects(
-        names, first, second, source_rotations, effects, kind=kind, noise=noise, seed=seed
-    )
-    tool = trial.fit if trial is not None and trial.accepted else None
-    repaired = second[exchanged.permutation]
-    if tool is None:
-        robust, moved = exchanged.robust, first
-        inliers = robust.inliers
-        calibrated = robust.rigid.predict(first)
-        points, left = calibrated[inliers], robust.rigid.residuals[inliers]
-        uncertainty = transform_uncertainty(points, left)
-        if len(points) >= LEAST_FOR_DIRECTIONS:
-            alike = isotropy_p_value(first[inliers], repaired[inliers], seed=seed)
-            uncertainty = uncertainty_by_direction(uncertainty, points, left, alike)
-        after_loo = leave_one_out(first, repaired, inliers)
-    else:
-        assert trial is not None  # noqa: S101 - it has the fit
-        robust, moved = robust_of(tool, repaired), tool.moved
-        inliers, uncertainty = robust.inliers, uncertainty_of(tool)
-        after_loo = tool.residuals if trial.left_out is None else trial.left_out
-    _require_breadth(robust.rigid, uncertainty.sigma)
-    reference_names = names if match is None or not match.reference_ids else match.reference_ids
-    model = Calibration(
-        rotation=robust.rigid.rotation,
-        translation=robust.rigid.translation,
+    causes = find_causes(
+        names,
+        first,
+        second,
+        source_rotations,
+        effects,
+        observe,
         kind=kind,
-        frame=frame or DEFAULT_FRAME[kind],
-        ids=names,
-        provenance=dict(provenance or {}),
-        tool_offset=None if tool is None else tool.offset,
+        noise=noise,
+        seed=seed,
+        nested=nested,
+        progress=progress,
     )
+    repaired = second[causes.exchanged.permutation]
+    model = _model_of(causes, first, repaired, source_rotations, seed)
+    robust, moved, inliers = model.robust, model.moved, model.robust.inliers
+    _require_breadth(robust.rigid, model.uncertainty.sigma)
+    exchanged, trial = causes.exchanged, causes.trial
     found = swapped_ids.effects_of(exchanged, names, second, kind=kind)
+    if trial is not None and trial.effect is not None:
+        found = (*found, trial.effect)
+    if causes.in_model is not None:
+        found = (*found, *discovered_effects(causes.in_model))
+    reference_names = names if match is None or not match.reference_ids else match.reference_ids
     fit = SpotFit(
-        model=model,
+        model=_calibration_of(causes, model, names, kind, frame, provenance),
         match=match,
         ids=names,
         reference_ids=tuple(reference_names[row] for row in exchanged.permutation),
@@ -261,25 +282,88 @@ def fit_spots(
         reference=repaired,
         source_rotations=source_rotations,
         as_found=first - second,
-        before=before,
+        before=fit_rigid(first, second, checked=False),
         before_loo=leave_one_out(first, second),
-        after_loo=after_loo,
+        after_loo=model.left_out,
         exchanged=exchanged,
         robust=robust,
         affine=fit_affine(first, second),
         translation=fit_translation(moved[inliers], repaired[inliers]),
         directions=residual_directions(robust.rigid.residuals[inliers]),
         support=rotation_support(moved[inliers], repaired[inliers]),
-        uncertainty=uncertainty,
-        effects=found if trial is None or trial.effect is None else (*found, trial.effect),
+        uncertainty=model.uncertainty,
+        effects=found,
         noise=noise,
-        notes=notes if tool is None else tuple(note for note in notes if note.code != "NOT_CONGRUENT"),
+        notes=notes if not model.has_tool else tuple(note for note in notes if note.code != "NOT_CONGRUENT"),
         tool=trial,
-        orientations=_orientations(robust, source_rotations, reference_rotations, exchanged),
+        orientations=_orientations(robust, model.rotations, reference_rotations, exchanged),
+        discovery=causes.discovery,
+        observations=causes.observations,
+        noise_source=noise_source if noise is not None else None,
+        kind_of_search="all" if effects == "auto" else "some",
     )
     if method == "paper":
         return paper_fit(fit, tau=tau, n_min=n_min, seed=seed)
     return affine_fit(fit) if method == "affine" else fit
+
+
+@dataclass(frozen=True, eq=False)
+class _Model:
+    """The final model of a fit, whatever effects are in it: the robust fit of the moved spots, and how sure it is."""
+
+    robust: RobustFit
+    moved: Array
+    rotations: Rotation | None
+    uncertainty: TransformUncertainty
+    left_out: Array
+    has_tool: bool
+
+
+def _model_of(causes: Causes, source: Array, repaired: Array, rotations: Rotation | None, seed: int) -> _Model:
+    trial, joint = causes.trial, causes.in_model
+    if joint is not None:
+        robust = effects_model.robust_of(joint.fit, repaired)
+        calibrated = robust.rigid.predict(joint.fit.moved)
+        sure = effects_model.uncertainty_of(joint.fit, calibrated)
+        has_tool = any(term.effect == tool_offset.NAME for term in joint.fit.terms)
+        left_out = effects_model.left_out_of(joint.fit)
+        return _Model(robust, joint.fit.moved, joint.fit.rotations, sure, left_out, has_tool)
+    if trial is not None and trial.accepted and trial.fit is not None:
+        left = trial.fit.residuals if trial.left_out is None else trial.left_out
+        robust = tool_model.robust_of(trial.fit, repaired)
+        return _Model(robust, trial.fit.moved, rotations, tool_model.uncertainty_of(trial.fit), left, True)
+    robust = causes.exchanged.robust
+    inliers = robust.inliers
+    points, left = robust.rigid.predict(source)[inliers], robust.rigid.residuals[inliers]
+    uncertainty = transform_uncertainty(points, left)
+    if len(points) >= LEAST_FOR_DIRECTIONS:
+        alike = isotropy_p_value(source[inliers], repaired[inliers], seed=seed)
+        uncertainty = uncertainty_by_direction(uncertainty, points, left, alike)
+    return _Model(robust, source, rotations, uncertainty, leave_one_out(source, repaired, inliers), False)
+
+
+def _calibration_of(
+    causes: Causes,
+    model: _Model,
+    names: tuple[str, ...],
+    kind: Kind,
+    frame: Frame | None,
+    provenance: Mapping[str, Any] | None,
+) -> Calibration:
+    joint, trial = causes.in_model, causes.trial
+    robot = causes.observations.robot if causes.observations is not None else None
+    return Calibration(
+        rotation=model.robust.rigid.rotation,
+        translation=model.robust.rigid.translation,
+        kind=kind,
+        frame=frame or DEFAULT_FRAME[kind],
+        ids=names,
+        provenance=dict(provenance or {}),
+        tool_offset=trial.fit.offset if trial is not None and trial.accepted and trial.fit is not None else None,
+        terms=() if joint is None else joint.fit.terms,
+        values=() if joint is None else joint.fit.values,
+        robot=None if joint is None or robot is None else robot_record(robot),
+    )
 
 
 def _orientations(

@@ -16,11 +16,12 @@ from respot.registration.statistics import rms
 
 if TYPE_CHECKING:
     from respot.calibration.calibration import Calibration
+    from respot.calibration.discovery.discover import Discovery
     from respot.calibration.spot_fit import SpotFit
 
 Array = NDArray[np.float64]
 
-_RIGID, _WITH_TOOL = 6, 9
+_RIGID = 6
 #: A spot is outside of the fitted ones where it leaves their hull by more than they scatter.
 _MARGIN = 3.0
 _SYMMETRIC = 1e-9
@@ -32,9 +33,9 @@ class Precision:
 
     Attributes
     ----------
-    covariance : (6, 6) or (9, 9) array
+    covariance : (6 + k, 6 + k) array
         Of a left perturbation about ``centroid``, tx, ty, tz [mm] and rx, ry, rz [deg], all along the axes of the
-        reference frame; with a tool offset also of its ox, oy, oz in the tool's axes [mm].
+        reference frame; then of the k parameters of the effects, a tool offset's in the tool's axes [mm].
     centroid : (3,) array
         Reference frame [mm].
     noise : (3, 3) array
@@ -50,6 +51,11 @@ class Precision:
         measurements are held to [mm].
     heldout_n : int
         Of how many spots.
+    effect_scatter : tuple of (3, 3) arrays
+        For each effect of the model what it moves the fitted spots by, mean square along the axes of the reference
+        frame [mm^2]: what a prediction without it does not know.
+    unknown : (3, 3) array or None
+        Mean square of the effects that are left out of a prediction, along the same axes [mm^2].
 
     Raises
     ------
@@ -65,13 +71,16 @@ class Precision:
     residuals: Array | None = None
     heldout_rms: float | None = None
     heldout_n: int = 0
+    effect_scatter: tuple[Array, ...] = ()
+    unknown: Array | None = None
 
     def __post_init__(self) -> None:
         covariance = _frozen(self.covariance)
         regions = tuple(_frozen(spots) for spots in self.regions)
         residuals = None if self.residuals is None else _frozen(self.residuals)
-        if covariance.shape not in ((_RIGID, _RIGID), (_WITH_TOOL, _WITH_TOOL)) or np.shape(self.centroid) != (3,):
-            raise ValueError("the covariance must be 6 x 6 or 9 x 9 and the centroid 3 numbers")
+        square = covariance.ndim == 2 and covariance.shape[0] == covariance.shape[1] >= _RIGID
+        if not square or np.shape(self.centroid) != (3,):
+            raise ValueError("the covariance must be square, 6 x 6 or larger, and the centroid 3 numbers")
         if not regions or any(spots.ndim != 2 or spots.shape[1] != 3 or not len(spots) for spots in regions):
             raise ValueError("the spots it was fitted to must be n points of 3 numbers")
         if residuals is not None and (len(regions) != 1 or residuals.shape != regions[0].shape):
@@ -90,12 +99,13 @@ class Precision:
         if self.heldout_rms is not None and not (0.0 <= self.heldout_rms < np.inf and self.heldout_n > 0):
             raise ValueError("the held-out RMS must be of some spots and not negative")
         values = {"covariance": covariance, "noise": noise, "regions": regions, "residuals": residuals}
+        values["effect_scatter"] = tuple(_frozen(square) for square in self.effect_scatter)
         for name, value in {**values, "centroid": _frozen(self.centroid)}.items():
             object.__setattr__(self, name, value)
 
     @property
     def parameters(self) -> int:
-        """6, or 9 with a tool offset."""
+        """6, and those of the effects."""
         return len(self.covariance)
 
     @property
@@ -103,27 +113,27 @@ class Precision:
         """Noise per coordinate: RMS over the axes [mm]."""
         return float(np.sqrt(np.trace(self.noise) / 3.0))
 
-    def covariance_of(self, calibrated: Array, rotations: Rotation | None) -> Array:
+    def covariance_of(self, calibrated: Array, columns: Array | None) -> Array:
         """Covariance (n, 3, 3) of predicted positions by the parameters alone, reference frame [mm^2].
 
         Parameters
         ----------
         calibrated : (n, 3) array
             Predicted positions, reference frame [mm].
-        rotations : Rotation of n, or None
-            Tool orientations in the reference frame; needed with a tool offset.
+        columns : (n, 3, k) array, or None
+            Shift of each spot per unit of each parameter of the effects, reference frame (of a tool offset: the tool's
+            orientation).
 
         Raises
         ------
         ValueError
-            A tool offset and no orientations.
+            Other columns than there are parameters of effects.
         """
-        with_tool = self.parameters == _WITH_TOOL
-        if with_tool and rotations is None:
-            raise ValueError("a tool offset moves spots by their orientation: it is needed")
-        rows = _rows(calibrated - self.centroid, rotations if with_tool else None)
+        rows = _rows(calibrated - self.centroid, columns)
+        if rows.shape[2] != self.parameters:
+            raise ValueError("the model has effects: their columns are needed, one for each parameter")
         result: Array = np.einsum("nik,kl,njl->nij", rows, self.covariance, rows)
-        return result
+        return result if self.unknown is None else result + self.unknown
 
     def leverage_of(self, covariance: Array) -> Array:
         """Leverage (n,): what the parameters add to the variance of a new spot, as a share of the noise's variance.
@@ -219,6 +229,7 @@ class Precision:
             "degrees_of_freedom": self.degrees_of_freedom,
             "fitted_spots": [spots.tolist() for spots in self.regions],
             "residuals": None if self.residuals is None else self.residuals.tolist(),
+            **({"effect_scatter": [square.tolist() for square in self.effect_scatter]} if self.effect_scatter else {}),
             "heldout": None if self.heldout_rms is None else {"rms": self.heldout_rms, "n": self.heldout_n},
         }
 
@@ -241,6 +252,7 @@ class Precision:
             residuals=None if residuals is None else np.array(residuals, dtype=np.float64),
             heldout_rms=None if heldout is None else float(heldout["rms"]),
             heldout_n=0 if heldout is None else int(heldout["n"]),
+            effect_scatter=tuple(np.array(square, dtype=np.float64) for square in record.get("effect_scatter", [])),
         )
 
 
@@ -266,7 +278,11 @@ def with_precision(fit: SpotFit) -> Calibration:
         residuals, turned = fit.robust.rigid.residuals[rows], None
         if model.tool_offset is not None and fit.source_rotations is not None:
             turned = Rotation.from_matrix(model.rotation) * fit.source_rotations[rows]
-        precision = precision_of(fit.source[rows], fit.calibrated[rows], residuals, turned)
+        if fit.discovery is not None and model.terms:
+            precision = _with_effects(fit, fit.discovery, residuals)
+        else:
+            columns = None if turned is None else np.asarray(turned.as_matrix())
+            precision = precision_of(fit.source[rows], fit.calibrated[rows], residuals, columns)
     else:  # the noise is that of all inliers, about another transform than the subset's: only its size is known
         noise, free = sure.sigma**2 * np.eye(3), float(sure.degrees_of_freedom)
         precision = Precision(sure.covariance, sure.centroid, noise, free, (fit.source[rows],))
@@ -274,7 +290,31 @@ def with_precision(fit: SpotFit) -> Calibration:
     return replace(model, precision=precision)
 
 
-def precision_of(source: Array, calibrated: Array, residuals: Array, rotations: Rotation | None = None) -> Precision:
+def _with_effects(fit: SpotFit, found: Discovery, residuals: Array) -> Precision:
+    """Precision of a model with effects: the joint fit's covariance, and the scatter of what it leaves."""
+    inliers = found.fit.inliers
+    noise = _symmetric(3.0 * residuals.T @ residuals / found.fit.free)
+    free = float(found.fit.free * direction_share(noise))
+    centroid = fit.calibrated[inliers].mean(axis=0)
+    scatter, start = [], 6
+    for value in found.fit.values:
+        stop = start + len(value)
+        columns = found.fit.columns[inliers][:, :, start:stop] / found.fit.priors[start - 6 : stop - 6]
+        shifts = columns @ value @ found.fit.rotation.T
+        scatter.append(_symmetric(shifts.T @ shifts / len(shifts)))
+        start = stop
+    return Precision(
+        found.fit.covariance,
+        centroid,
+        noise,
+        free,
+        (fit.source[inliers],),
+        residuals,
+        effect_scatter=tuple(scatter),
+    )
+
+
+def precision_of(source: Array, calibrated: Array, residuals: Array, columns: Array | None = None) -> Precision:
     """Precision of the least-squares fit of some pairs, for noise that may differ by direction.
 
     With p parameters the noise is the scatter of the residuals, over n - p / 3; the covariance of the least-squares fit
@@ -288,11 +328,12 @@ def precision_of(source: Array, calibrated: Array, residuals: Array, rotations: 
         The pairs it was fitted to, source frame; and predicted, reference frame [mm].
     residuals : (n, 3) array
         Predicted minus reference [mm].
-    rotations : Rotation of n, optional
-        Of a fit with a tool offset (p = 9, else 6): the tool's orientations in the reference frame.
+    columns : (n, 3, p - 6) array, optional
+        Of a fit with effects: shift of each spot per unit of their parameters, reference frame; of a tool offset the
+        tool's orientations.
     """
     centroid = calibrated.mean(axis=0)
-    rows = _rows(calibrated - centroid, rotations)
+    rows = _rows(calibrated - centroid, columns)
     size = rows.shape[2]
     free = 3 * len(source) - size
     noise = _symmetric(3.0 * residuals.T @ residuals / free)
@@ -304,11 +345,11 @@ def precision_of(source: Array, calibrated: Array, residuals: Array, rotations: 
     return Precision(_symmetric(covariance), centroid, noise, free * direction_share(noise), (source,), residuals)
 
 
-def _rows(offsets: Array, rotations: Rotation | None) -> Array:
-    """Shifts (n, 3, p) of points at offsets (n, 3) from the centroid [mm] by each parameter [mm, deg]."""
+def _rows(offsets: Array, columns: Array | None) -> Array:
+    """Shifts (n, 3, p) of points at offsets (n, 3) from the centroid [mm] by each parameter [mm, deg, ...]."""
     rigid = jacobian(offsets)
     rigid[:, :, 3:] *= np.pi / 180.0
-    return rigid if rotations is None else np.concatenate([rigid, rotations.as_matrix()], axis=2)
+    return rigid if columns is None else np.concatenate([rigid, columns], axis=2)
 
 
 def direction_share(noise: Array) -> float:

@@ -13,13 +13,18 @@ from scipy.spatial.transform import Rotation
 
 from respot.calibration.ball import SHARE, ball_radius
 from respot.calibration.calibration import Calibration, CalibrationError
+from respot.calibration.covariates import covariates_of
+from respot.calibration.effects.moved import missing
+from respot.calibration.observations import Observations
+from respot.calibration.source_observations import SourceObservations
 from respot.calibration.stored import load_calibration, source_issues
 from respot.geometry import abc_from_rotation
 from respot.issues import BadInputError, Issue
 from respot.kinematics.model import RobotModel
+from respot.kinematics.robot_file import robot_from_record
 from respot.registration.rigid import transform_of
 from respot.spots import Source, is_backup, read_source, spots_of_table
-from respot.tables import read_table
+from respot.tables import Table, read_table
 
 Array = NDArray[np.float64]
 
@@ -88,6 +93,7 @@ def predict_spots(
     ids: Sequence[str],
     positions: ArrayLike,
     rotations: Rotation | None = None,
+    observations: Observations | None = None,
     *,
     share: float = SHARE,
     bootstrap: int = 0,
@@ -106,6 +112,8 @@ def predict_spots(
         Source frame [mm].
     rotations : Rotation of n, optional
         Tool orientations in the source frame.
+    observations : Observations of n, optional
+        What else is known of the spots: needed for effects.
     share : float
         Probability of the ball, between 0 and 1.
     bootstrap : int
@@ -116,27 +124,40 @@ def predict_spots(
     Raises
     ------
     CalibrationError
-        ``CALIBRATION_NEEDS_ORIENTATION`` for a tool offset and no orientations; ``CALIBRATION_INCOMPLETE`` for a
-        bootstrap of a calibration that does not hold its spots and residuals.
+        As `Calibration.predict`; ``CALIBRATION_INCOMPLETE`` for a bootstrap of a calibration that does not hold its
+        spots and residuals.
     """
     given = np.asarray(positions, dtype=np.float64).reshape(-1, 3)
-    moved, turned = calibration.predict(given, rotations)
+    moved, turned = calibration.predict(given, rotations, observations)
     names, sure = tuple(ids), calibration.precision
     if bootstrap:
         radii = _bootstrap(calibration, given, share, bootstrap, seed)
     if sure is None:
         return Prediction(names, moved, turned)
-    covariance = sure.covariance_of(moved, turned)
+    covariance = sure.covariance_of(moved, _columns_of(calibration, given, rotations, turned, observations))
     if not bootstrap:
         free = sure.degrees_of_freedom
         radii = ball_radius(covariance, free, share), ball_radius(covariance + sure.noise, free, share)
     return Prediction(names, moved, turned, *radii, sure.leverage_of(covariance), sure.outside(given))
 
 
+def _columns_of(
+    calibration: Calibration,
+    points: Array,
+    rotations: Rotation | None,
+    turned: Rotation | None,
+    observations: Observations | None,
+) -> Array | None:
+    """Shift (n, 3, k) of each spot per unit of each parameter of its effects, reference frame; None without effects."""
+    if calibration.terms and observations is not None:
+        return calibration.effect_columns(replace(observations, positions=points, rotations=rotations))
+    return np.asarray(turned.as_matrix()) if calibration.tool_offset is not None and turned is not None else None
+
+
 def _bootstrap(calibration: Calibration, points: Array, share: float, draws: int, seed: int) -> tuple[Array, Array]:
     """Radii (n,) by refits to residual vectors drawn with replacement, scaled to the noise; without and with noise."""
     sure = calibration.precision
-    if sure is None or sure.residuals is None or calibration.tool_offset is not None:
+    if sure is None or sure.residuals is None or calibration.tool_offset is not None or calibration.terms:
         message = "a bootstrap needs the spots and residuals of one rigid least-squares fit; the calibration has none"
         raise CalibrationError("CALIBRATION_INCOMPLETE", message)
     spots = sure.regions[0]
@@ -227,12 +248,12 @@ def predict_source(
     """
     calibration = load_calibration(calibration_path)
     source, issues = read_for(calibration, source_path, options)
-    if covariates is not None:
-        issues += _unused(covariates, source)
+    used, observations, found = seen_by(calibration, source, options, covariates)
+    issues += found
     spots = source.spots
     try:
         prediction = predict_spots(
-            calibration, spots.ids, spots.positions, spots.rotations, bootstrap=bootstrap, seed=seed
+            used, spots.ids, spots.positions, spots.rotations, observations, bootstrap=bootstrap, seed=seed
         )
     except CalibrationError as error:
         code = "NO_ORIENTATION" if error.code == "CALIBRATION_NEEDS_ORIENTATION" else "BAD_CALIBRATION"
@@ -258,7 +279,7 @@ def read_for(calibration: Calibration, path: Path, options: UseOptions) -> tuple
         if options.robot is not None:
             issues.append(Issue("OPTION_UNUSED", "--robot is for tables of joints; the programs tell poses", str(path)))
     else:
-        source, used = _table_of_joints(path, options.robot)
+        source, used = table_of_joints(path, options.robot)
         issues.append(used)
     if not source.spots.ids:
         detail = f": {source.spots.issues[0]}" if source.spots.issues else "; --spot-id REGEX tells how they are named"
@@ -267,12 +288,14 @@ def read_for(calibration: Calibration, path: Path, options: UseOptions) -> tuple
     return source, [*source.issues, *issues, *found]
 
 
-def _table_of_joints(path: Path, robot: RobotModel) -> tuple[Source, Issue]:
+def table_of_joints(path: Path, robot: RobotModel) -> tuple[Source, Issue]:
     """Read a table with a robot at hand: it says where the flange is if the table has joints and no positions."""
     table = read_table(path)
     if table.xyz is not None or table.joints is None:
         message = "--robot is for tables of joints without positions; this one tells positions"
-        return Source(path, spots_of_table(table), table.sha256), Issue("OPTION_UNUSED", message, str(path))
+        return Source(path, spots_of_table(table), table.sha256, table=table), Issue(
+            "OPTION_UNUSED", message, str(path)
+        )
     missing = np.flatnonzero(~np.isfinite(table.joints).all(axis=1))
     if len(missing):
         row = int(missing[0])
@@ -285,19 +308,72 @@ def _table_of_joints(path: Path, robot: RobotModel) -> tuple[Source, Issue]:
     every = [True] * len(table.ids)
     moved = replace(table, xyz=np.asarray(flange.translation), rotations=flange.rotation, oriented=every)
     message = "has joints and no positions: they are those of the flange in the robot's base, no tool is known"
-    return Source(path, spots_of_table(moved), table.sha256), Issue("TABLE_COLUMNS", message, str(path))
+    return Source(path, spots_of_table(moved), table.sha256, table=moved), Issue("TABLE_COLUMNS", message, str(path))
 
 
-def _unused(covariates: Path, source: Source) -> list[Issue]:
-    """What is said of covariates: no effect that a calibration can hold follows a column."""
-    table = read_table(covariates, pose_needed=False)
+def seen_by(
+    calibration: Calibration, source: Source, options: UseOptions, covariates: Path | None
+) -> tuple[Calibration, Observations | None, list[Issue]]:
+    """Observations of a source for the effects of a calibration, which are left out where these do not tell them.
+
+    Parameters
+    ----------
+    calibration : Calibration
+    source : Source
+    options : UseOptions
+    covariates : Path, optional
+        Table of columns, joined by id.
+
+    Returns
+    -------
+    (Calibration, Observations or None, list of Issue)
+        The calibration without the effects that are left out; None without effects.
+    """
+    issues: list[Issue] = []
+    table = None if covariates is None else read_table(covariates, pose_needed=False)
+    if not calibration.terms:
+        return calibration, None, [] if table is None else [_unused(table, source)]
+    robot = options.robot
+    if robot is None and calibration.robot is not None:
+        robot = robot_from_record(calibration.robot)
+    gathered = SourceObservations(source, None, robot, constant=True)
+    observations = gathered.of(np.arange(len(source.spots.ids)))
+    if table is not None:
+        observations = _joined(observations, source, table)
+    lacking = [term for term in calibration.terms if missing(observations, term)]
+    for term in lacking:
+        message = (
+            f"{term.label} is left out: {missing(observations, term)} is not known (--covariates TABLE tells columns); "
+            "the intervals are as much wider"
+        )
+        issues.append(Issue("EFFECT_LEFT_OUT", message, str(source.path)))
+    return calibration.without(lacking), observations, [*gathered.issues, *issues]
+
+
+def _joined(observations: Observations, source: Source, table: Table) -> Observations:
+    """Observations with the columns of a table that names all spots of the source; others are not known."""
+    rows = {name.casefold(): row for row, name in enumerate(table.ids)}
+    order = [rows.get(name.casefold(), -1) for name in source.spots.ids]
+    if min(order, default=-1) < 0:
+        lost = next(name for name, row in zip(source.spots.ids, order, strict=True) if row < 0)
+        raise BadInputError("NO_COMMON_IDS", f"does not name the spot {lost}; give every spot a row", table.path)
+    found, _ = covariates_of(table.columns, table.numbers, ("id", "x", "y", "z"), constant=True)
+    taken = {name: column.rows(np.array(order)) for name, column in found.items()}
+    measured = observations.measured_joints
+    if measured is None and table.measured_joints is not None:
+        measured = table.measured_joints[order]
+    return replace(observations, columns={**observations.columns, **taken}, measured_joints=measured)
+
+
+def _unused(table: Table, source: Source) -> Issue:
+    """What is said of covariates where no effect follows a column."""
     names = {name.casefold() for name in table.ids}
     known = sum(name.casefold() in names for name in source.spots.ids)
     message = (
         f"nothing uses it: no effect of this calibration follows a column (it names {known} of {len(source.spots.ids)} "
         "spots); the prediction is the same without"
     )
-    return [Issue("OPTION_UNUSED", message, str(covariates))]
+    return Issue("OPTION_UNUSED", message, table.path)
 
 
 def extrapolated(prediction: Prediction) -> list[Issue]:

@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from respot.calibration.discovery.records import hidden_of, measure_next_of, questions_of, tried_of
 from respot.calibration.spot_fit import SpotFit
 from respot.calibration.uncertainty import PARAMETERS
 from respot.geometry import abc_from_rotation
 from respot.registration.affine import AffineFit
+from respot.registration.leave_one_out import without_folds
 from respot.registration.matching import EXACT, PLACE, IdMatch
 from respot.registration.paper import PaperFit
 from respot.registration.statistics import distances, rms
@@ -83,24 +85,79 @@ def _report(fit: SpotFit) -> dict[str, Any]:
             "intervals_by_direction": fit.uncertainty.by_direction,
         },
         "effects": [effect.to_dict() for effect in fit.effects],
-        "effects_tried": [] if fit.tool is None else [fit.tool.to_dict()],
+        **_search(fit),
         "orientations": None if fit.orientations is None else fit.orientations.to_dict(),
         "as_found": distances(fit.as_found).to_dict(),
         "before": distances(fit.before.residuals).to_dict(),
         "after": distances(rigid.residuals[inliers]).to_dict(),
         "after_all": distances(rigid.residuals).to_dict(),
         "leave_one_out": {"before": _number(rms(fit.before_loo)), "after": _number(rms(fit.after_loo[inliers]))},
-        "heldout": {
-            "scheme": "leave-one-out",
-            "n": n,
-            "before": _statistics(fit.before_loo),
-            "after": _statistics(fit.after_loo),
-            "repaired_ids": [name for name, changed in zip(fit.ids, fit.repaired, strict=True) if changed],
-        },
+        "heldout": _heldout(fit),
         "inlier_threshold": fit.robust.threshold,
         "noise_floor": fit.noise,
-        "unexplained": {"present": None, "correlates": []},
+        "noise": _noise(fit),
+        "unexplained": _unexplained(fit),
         "spots": _spots(fit),
+    }
+
+
+def _search(fit: SpotFit) -> dict[str, Any]:
+    """What was tried and lost, what is hidden, what could not be asked, what to measure next."""
+    found = fit.discovery
+    tried = [] if fit.tool is None else [fit.tool.to_dict()]
+    if found is None:
+        asked = questions_of(None, len(fit.ids), None) if fit.kind_of_search == "all" else []
+        return {"effects_tried": tried, "hidden": [], "questions": asked, "measure_next": []}
+    listed = {record["name"] for record in tried} | {effect.name for effect in fit.effects}
+    return {
+        "effects_tried": [*tried, *(record for record in tried_of(found) if record["name"] not in listed)],
+        "hidden": hidden_of(found),
+        "questions": questions_of(fit.observations, len(fit.ids), found),
+        "measure_next": measure_next_of(found),
+    }
+
+
+def _heldout(fit: SpotFit) -> dict[str, Any]:
+    """Errors of spots that took no part: each fifth left out of choosing and fitting, else one spot at a time."""
+    repaired = [name for name, changed in zip(fit.ids, fit.repaired, strict=True) if changed]
+    found = fit.discovery
+    if not fit.model.terms or found is None or found.nested is None or found.nested_folds is None:
+        return {
+            "scheme": "leave-one-out",
+            "n": len(fit.ids),
+            "before": _statistics(fit.before_loo),
+            "after": _statistics(fit.after_loo),
+            "repaired_ids": repaired,
+        }
+    judged = np.isfinite(found.nested).all(axis=1) & fit.robust.inliers
+    before = without_folds(fit.source, fit.reference_as_named, found.nested_folds)
+    return {
+        "scheme": "each fifth of the spots left out of choosing and fitting; outliers are not counted",
+        "n": int(judged.sum()),
+        "before": _statistics(before[judged]),
+        "after": _statistics(found.nested[judged]),
+        "repaired_ids": repaired,
+    }
+
+
+def _unexplained(fit: SpotFit) -> dict[str, Any]:
+    left = None if fit.discovery is None else fit.discovery.unexplained
+    if left is None:
+        return {"present": None, "text": "", "correlates": []}
+    correlates = [
+        {"column": each.column, "strength": each.strength, "p_value": each.p_value} for each in left.correlates
+    ]
+    return {"present": left.present, "text": left.text, "correlates": correlates}
+
+
+def _noise(fit: SpotFit) -> dict[str, Any]:
+    left = None if fit.discovery is None else fit.discovery.unexplained
+    return {
+        "sigma": fit.uncertainty.sigma,
+        "floor": fit.noise,
+        "ratio": None if not fit.noise else fit.uncertainty.sigma / fit.noise,
+        "reached": None if left is None else left.reached,
+        "source": fit.noise_source,
     }
 
 
@@ -211,8 +268,8 @@ def _transform(fit: SpotFit) -> dict[str, Any]:
 
 
 def _spots(fit: SpotFit) -> list[dict[str, Any]]:
-    points, tools = fit.calibrated, fit.source_rotations
-    angles = None if tools is None else abc_from_rotation(Rotation.from_matrix(fit.model.rotation) * tools)
+    points, tools = fit.calibrated, fit.calibrated_rotations
+    angles = None if tools is None else abc_from_rotation(tools)
     residuals = fit.robust.rigid.residuals
     as_found, before, after = (np.linalg.norm(v, axis=1) for v in (fit.as_found, fit.before.residuals, residuals))
     rows = []

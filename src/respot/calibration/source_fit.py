@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,13 +14,19 @@ from respot.calibration.effects import tool_offset
 from respot.calibration.effects.search import RIGID_ONLY, Effects
 from respot.calibration.effects.tool_fit import moved_by
 from respot.calibration.fit import fit_tables
+from respot.calibration.prediction import table_of_joints
+from respot.calibration.repeats import noise_of_table
+from respot.calibration.source_observations import SourceObservations
 from respot.calibration.spot_fit import Method, SpotFit
 from respot.calibration.stored import robot_identity
 from respot.issues import BadInputError, Issue
+from respot.kinematics.model import RobotModel
 from respot.registration.errors import RegistrationError
 from respot.registration.matching import Matching
-from respot.spots import Source, read_source
+from respot.spots import Source, is_backup, read_source
 
+#: Repeats tell the noise with this many degrees of freedom or more.
+_LEAST_REPEATS = 15
 #: At most this many spots are listed one by one in issues.
 _MOST_LISTED = 20
 
@@ -55,6 +61,10 @@ class FitOptions:
         A plant's instruction forms.
     effects : "auto" or names
         Effects to look for.
+    robot : RobotModel, optional
+        Kinematics for a table's joints, or in the place of the backup's own.
+    progress : callable
+        Called as the search for effects goes on.
     """
 
     kind: Kind = "theory"
@@ -69,6 +79,8 @@ class FitOptions:
     match: Matching = "auto"
     profiles: Sequence[Path] = ()
     effects: Effects = RIGID_ONLY
+    robot: RobotModel | None = None
+    progress: Callable[[], None] = lambda: None
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,11 +112,13 @@ def fit_source(source_path: Path, reference_path: Path, options: FitOptions) -> 
         The source or reference cannot be used, or they do not determine a transform.
     """
     reference = read_source(reference_path, spot_id=options.spot_id, profiles=options.profiles)
-    source = read_source(source_path, reference.spots.ids, options.spot_id, options.robot_name, options.profiles)
+    source = _source_of(source_path, reference, options)
     for side, path in ((source, source_path), (reference, reference_path)):
         if not side.spots.ids:
             detail = f": {side.spots.issues[0]}" if side.spots.issues else "; --spot-id REGEX tells how they are named"
             raise BadInputError("NO_COMMON_IDS", f"holds no weld spot that can be used{detail}", str(path))
+    observations = SourceObservations(source, reference, options.robot)
+    noise, noise_source = _noise_of(options, reference)
     try:
         fit = fit_tables(
             source.spots.ids,
@@ -115,13 +129,16 @@ def fit_source(source_path: Path, reference_path: Path, options: FitOptions) -> 
             frame=options.frame,
             source_rotations=source.spots.rotations,
             reference_rotations=reference.spots.rotations,
-            noise=options.noise,
+            noise=noise,
+            noise_source=noise_source,
             seed=options.seed,
             method=options.method,
             tau=options.tau,
             n_min=options.n_min,
             matching=options.match,
             effects=options.effects,
+            observe=observations.of,
+            progress=options.progress,
             provenance={
                 "version": __version__,
                 "source": str(source_path),
@@ -133,7 +150,52 @@ def fit_source(source_path: Path, reference_path: Path, options: FitOptions) -> 
         )
     except RegistrationError as error:
         raise BadInputError(error.code, _advice(error, source, reference), str(reference_path)) from error
-    return SourceFit(source, reference, fit, [*source.issues, *reference.issues, *_fit_issues(fit, source, reference)])
+    issues = [*source.issues, *reference.issues, *_fit_issues(fit, source, reference)]
+    if fit.discovery is not None:
+        issues += [*observations.issues, *_effect_issues(fit, source)]
+    return SourceFit(source, reference, fit, issues)
+
+
+def _source_of(path: Path, reference: Source, options: FitOptions) -> Source:
+    """Read the source; a table of joints without positions by the named robot's flange."""
+    if options.robot is not None and not is_backup(path):
+        found, used = table_of_joints(path, options.robot)
+        if used.code != "OPTION_UNUSED":
+            return found
+    return read_source(path, reference.spots.ids, options.spot_id, options.robot_name, options.profiles)
+
+
+def _noise_of(options: FitOptions, reference: Source) -> tuple[float | None, str]:
+    """Noise per coordinate that is known independently [mm], and where from: the user's word, else repeats."""
+    if options.noise is not None:
+        return options.noise, "--noise"
+    repeats = None if reference.table is None else noise_of_table(reference.table)
+    if repeats is None or repeats.sigma is None or repeats.degrees_of_freedom < _LEAST_REPEATS:
+        return None, ""
+    return repeats.sigma_of_mean, "repeats"
+
+
+def _effect_issues(fit: SpotFit, source: Source) -> list[Issue]:
+    """What discovery found, in one line each."""
+    issues = []
+    found = fit.discovery
+    assert found is not None  # noqa: S101 - asked only where there is one
+    for effect in fit.effects if fit.model.terms else ():
+        if effect.name != "swapped_ids":
+            how = "named" if effect.named else "consistent with"
+            place = " ".join(f"{key} {value}" for key, value in effect.where.items() if key != "frame")
+            issues.append(
+                Issue("EFFECT_FOUND", f"{how}: {effect.name} {place}: {effect.remedy.text}", str(source.path))
+            )
+    if found.unexplained.present:
+        issues.append(Issue("UNEXPLAINED", found.unexplained.text, str(source.path)))
+    if fit.observations is not None and fit.observations.absolute_accuracy:
+        message = (
+            "the controller compensates the arm's own errors, and joints from nominal lengths are not the robot's: "
+            "effects of the arm are not looked for; rigid part, tool, wear, time and groups are"
+        )
+        issues.append(Issue("ABSOLUTE_ACCURACY", message, str(source.path)))
+    return issues
 
 
 def _advice(error: RegistrationError, source: Source, reference: Source) -> str:

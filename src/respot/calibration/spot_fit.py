@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from respot.calibration.calibration import Calibration, CalibrationError
+from respot.calibration.discovery.discover import Discovery
 from respot.calibration.effects.effect import Effect
 from respot.calibration.effects.orientations import OrientationFit
 from respot.calibration.effects.tool_offset import ToolTrial
+from respot.calibration.observations import Observations
 from respot.calibration.uncertainty import TransformUncertainty
 from respot.registration.affine import AffineFit
 from respot.registration.alternatives import TranslationFit
@@ -80,6 +82,15 @@ class SpotFit:
         then the fit of `moved`, and ``uncertainty.covariance`` (9, 9) has the offset's three parameters last.
     orientations : OrientationFit or None
         How tool orientations compare, where source and reference have them.
+    discovery : Discovery or None
+        The search for all other effects, where there was one. Where ``model.terms`` are its terms, ``robust`` is the
+        fit of `moved`, and ``uncertainty.covariance`` has their parameters last.
+    observations : Observations or None
+        What it saw.
+    noise_source : str or None
+        Where ``noise`` is known from: ``"--noise"`` or ``"repeats"``.
+    kind_of_search : "all" or "some"
+        Whether all effects were looked for, or some by their names.
     """
 
     model: Calibration
@@ -109,6 +120,10 @@ class SpotFit:
     notes: tuple[Note, ...] = ()
     tool: ToolTrial | None = None
     orientations: OrientationFit | None = None
+    discovery: Discovery | None = None
+    observations: Observations | None = None
+    noise_source: str | None = None
+    kind_of_search: Literal["all", "some"] = "some"
 
     @property
     def calibration(self) -> Calibration:
@@ -142,10 +157,20 @@ class SpotFit:
 
     @property
     def moved(self) -> Array:
-        """Source spots (n, 3) with the tool offset of the model, source frame [mm]: what the rigid part turns."""
+        """Source spots (n, 3) with the effects of the model, source frame [mm]: what the rigid part turns."""
+        if self.model.terms and self.discovery is not None:
+            return self.discovery.fit.moved
         if self.tool is None or self.tool.fit is None or not self.tool.accepted:
             return self.source
         return self.tool.fit.moved
+
+    @property
+    def calibrated_rotations(self) -> Rotation | None:
+        """Tool orientations under the final model, reference frame; None where the source has none."""
+        turned = self.source_rotations
+        if self.model.terms and self.discovery is not None:
+            turned = self.discovery.fit.rotations
+        return None if turned is None else Rotation.from_matrix(self.model.rotation) * turned
 
     @property
     def calibrated(self) -> Array:

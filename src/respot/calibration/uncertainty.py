@@ -50,7 +50,7 @@ class TransformUncertainty:
     by_direction: bool = False
 
 
-UNEVEN = 0.01
+UNEVEN = 0.05
 """Below this chance the noise is taken not to be the same along all axes."""
 
 

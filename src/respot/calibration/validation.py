@@ -16,9 +16,13 @@ from scipy import stats
 from scipy.spatial.transform import Rotation
 
 from respot.calibration.calibration import Calibration, CalibrationError, Kind
+from respot.calibration.effects.moved import missing
+from respot.calibration.observations import Observations
 from respot.calibration.prediction import Prediction, UseOptions, extrapolated, predict_spots, read_for
+from respot.calibration.source_observations import SourceObservations
 from respot.calibration.stored import load_calibration
 from respot.issues import BadInputError, Issue
+from respot.kinematics.robot_file import robot_from_record
 from respot.registration.errors import RegistrationError
 from respot.registration.matching import EXACT, IdMatch, match_by_name
 from respot.registration.statistics import Distances, distances
@@ -132,6 +136,7 @@ def validate_spots(
     rotations: Rotation | None = None,
     reference_ids: Sequence[str] | None = None,
     tolerance: float = 10.0,
+    observations: Observations | None = None,
 ) -> Validation:
     """Compare fresh pairs with where a calibration puts them.
 
@@ -147,6 +152,8 @@ def validate_spots(
         Names in the reference; default ``ids``.
     tolerance : float
         Largest distance of a good spot [mm].
+    observations : Observations of n, optional
+        What else is known of the pairs: needed for effects.
 
     Raises
     ------
@@ -160,7 +167,7 @@ def validate_spots(
         raise RegistrationError("SHAPE_MISMATCH", f"{len(ids)} names for points {first.shape} and {second.shape}")
     if not len(ids):
         raise RegistrationError("TOO_FEW_PAIRS", "no pair to compare")
-    prediction = predict_spots(calibration, ids, first, rotations)
+    prediction = predict_spots(calibration, ids, first, rotations, observations)
     residuals = prediction.positions - second
     names = tuple(ids if reference_ids is None else reference_ids)
     return Validation(prediction, names, residuals, tolerance, promise_of(calibration, residuals))
@@ -252,15 +259,18 @@ def validate_source(
         message = f"shares no spot ID with the source{other}; --spot-id REGEX tells which part of a name is the ID"
         raise BadInputError("NO_COMMON_IDS", message, str(reference_path))
     spots = source.spots
+    used, observations, found = _seen(calibration, source, reference, match, options)
+    issues = [*issues, *found]
     try:
         validation = validate_spots(
-            calibration,
+            used,
             match.ids,
             spots.positions[match.source_rows],
             reference.spots.positions[match.reference_rows],
             rotations=None if spots.rotations is None else spots.rotations[match.source_rows],
             reference_ids=match.reference_ids,
             tolerance=tolerance,
+            observations=observations,
         )
     except CalibrationError as error:
         raise BadInputError("NO_ORIENTATION", str(error), str(source_path)) from error
@@ -270,6 +280,27 @@ def validate_source(
     issues = [*issues, *reference.issues, *_pair_issues(match, source, reference), *_issues(validation)]
     issues += extrapolated(validation.prediction)
     return SourceValidation(source, reference, calibration, validation, issues)
+
+
+def _seen(
+    calibration: Calibration, source: Source, reference: Source, match: IdMatch, options: UseOptions
+) -> tuple[Calibration, Observations | None, list[Issue]]:
+    """What the pairs tell for the effects of a calibration, which are left out where they do not."""
+    if not calibration.terms:
+        return calibration, None, []
+    robot = options.robot
+    if robot is None and calibration.robot is not None:
+        robot = robot_from_record(calibration.robot)
+    gathered = SourceObservations(source, reference, robot, constant=True)
+    observations = gathered.of(match.source_rows, match.reference_rows)
+    lacking = [term for term in calibration.terms if missing(observations, term)]
+    issues = [
+        Issue(
+            "EFFECT_LEFT_OUT", f"{term.label} is left out: {missing(observations, term)} is not known", str(source.path)
+        )
+        for term in lacking
+    ]
+    return calibration.without(lacking), observations, [*gathered.issues, *issues]
 
 
 def _pair_issues(match: IdMatch, source: Source, reference: Source) -> list[Issue]:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
+import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -36,11 +39,15 @@ def run(
     match: options.Match = "auto",
     effects: options.EffectsOption = "auto",
     frame: options.FrameOption = None,
+    robot: options.RobotModel = None,
     robot_name: options.RobotName = None,
     spot_id: options.SpotId = None,
     profile: options.Profiles = None,
     noise: options.Noise = None,
     tolerance: options.Tolerance = 10.0,
+    report_file: Annotated[
+        Path | None, typer.Option("--report", help="Write the result as an HTML page.", show_default=False)
+    ] = None,
     seed: options.Seed = 0,
     force: options.Force = False,
     as_json: options.AsJson = False,
@@ -52,7 +59,10 @@ def run(
         from respot.calibration.precision import with_precision
         from respot.calibration.report import report
         from respot.calibration.source_fit import fit_source
-        from respot.cli.show_fit import show_fit
+        from respot.cli.progress import progress
+        from respot.cli.show_fit import describe, show_fit
+        from respot.figures.fit_page import fit_page
+        from respot.kinematics.robot_file import robot_of
 
         reference, chosen = reference_of(
             theory, measured, frame, robot_name, spot_id, noise, seed, method, tau, n_min, match
@@ -61,24 +71,51 @@ def run(
         if output is not None and method == "affine":
             message = "--method affine is for comparison only and makes no calibration to save: leave -o out"
             raise BadInputError("BAD_OPTION", message)
-        if output is not None and output.exists() and not force:
-            raise BadInputError(
-                "OUTPUT_EXISTS", "exists; name another file with -o, or replace it with --force", str(output)
-            )
-        if output is not None and any(holds(path, output) for path in (source, reference)):
-            message = "lies in the source or the reference; name another file with -o"
-            raise BadInputError("OUTPUT_EXISTS", message, str(output))
-        fitted = fit_source(source, reference, replace(chosen, profiles=tuple(profile or ()), effects=looked_for))
-        if output is not None:
-            try:
-                with_precision(fitted.fit).save(output)
-            except OSError as error:
-                raise BadInputError("CANNOT_READ", f"cannot be written: {error.strerror}", str(output)) from error
+        for option, path in (("-o", output), ("--report", report_file)):
+            _check_free(path, option, (source, reference), force)
+        model = None if robot is None else robot_of(robot)
+        chosen = replace(chosen, profiles=tuple(profile or ()), effects=looked_for, robot=model)
+        with progress("looking for effects", shown=looked_for != () and not as_json) as step:
+            fitted = fit_source(source, reference, replace(chosen, progress=step))
         content_hash = None if method == "affine" else fitted.fit.calibration.content_hash
-        data = {**report(fitted.fit), "calibration_hash": content_hash}
-        return Outcome("fit", data, lambda: show_fit(fitted, tolerance, output), list(fitted.issues))
+        data = {**report(fitted.fit), "calibration_hash": content_hash, "seed": seed}
+        if output is not None:
+            _written(output, with_precision(fitted.fit).to_json())
+        if report_file is not None:
+            page = fit_page(
+                data,
+                title=describe(fitted.source),
+                source=str(source),
+                reference=str(reference),
+                tolerance=tolerance,
+                command=shlex.join(["respot", *sys.argv[1:]]),
+                issues=[issue.as_json() for issue in fitted.issues],
+                seed=seed,
+            )
+            _written(report_file, page)
+        shown = lambda: show_fit(fitted, data, tolerance, output, report_file)  # noqa: E731
+        return Outcome("fit", data, shown, list(fitted.issues))
 
     run_command(work, as_json, strict)
+
+
+def _check_free(path: Path | None, option: str, inputs: Sequence[Path], force: bool) -> None:
+    """Refuse to write over a file, or into what is read."""
+    if path is None:
+        return
+    if path.exists() and not force:
+        message = f"exists; name another file with {option}, or replace it with --force"
+        raise BadInputError("OUTPUT_EXISTS", message, str(path))
+    if any(holds(read, path) for read in inputs):
+        message = f"lies in the source or the reference; name another file with {option}"
+        raise BadInputError("OUTPUT_EXISTS", message, str(path))
+
+
+def _written(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise BadInputError("CANNOT_READ", f"cannot be written: {error.strerror}", str(path)) from error
 
 
 def effects_named(text: str) -> Effects:
@@ -89,14 +126,14 @@ def effects_named(text: str) -> Effects:
     BadInputError
         ``BAD_OPTION`` for a name that no effect has.
     """
-    from respot.calibration.effects.search import effects_of
+    from respot.calibration.causes import names_of
     from respot.registration.errors import RegistrationError
 
     if text == "auto":
         return "auto"
     names = () if text == "none" else tuple(dict.fromkeys(name.strip() for name in text.split(",")))
     try:
-        return effects_of(names)
+        return names_of(names)
     except RegistrationError as error:
         raise BadInputError("BAD_OPTION", f"--effects is auto, none or names with commas: {error}") from error
 

@@ -84,7 +84,8 @@ EffectsOption = Annotated[
     str,
     typer.Option(
         "--effects",
-        help="What to look for beside the rigid part: auto, none, or names with commas (swapped_ids, tool_offset).",
+        help="What to look for beside the rigid part: auto, none, or names of effects with commas, such as "
+        "swapped_ids,joint_zero.",
     ),
 ]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything that is drawn.")]

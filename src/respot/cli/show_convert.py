@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from respot.calibration.report import report
 from respot.cli.display import Column, heading, line, table
 from respot.cli.show_fit import describe, show_fit
 from respot.issues import CODES
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 def show_conversion(conversion: Conversion, tolerance: float, written: Path | None) -> None:
     """Print a conversion: the fit, what moved, what stays, what was refused, where it is."""
     if conversion.fitted is not None:
-        show_fit(conversion.fitted, tolerance)
+        show_fit(conversion.fitted, report(conversion.fitted.fit), tolerance)
     correction = conversion.correction
     heading(f"{describe(conversion.source)}: {'written' if written else 'nothing written (dry run)'}")
     _show_moved(conversion)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from respot.cli.display import Column, heading, line, table, terminal_width
+from respot.cli.show_causes import show_causes
 from respot.cli.show_method import show_affine, show_paper
 from respot.cli.show_tool import show_tool
 from respot.languages import LANGUAGES
@@ -23,8 +25,21 @@ if TYPE_CHECKING:
 _COORDINATES, _EVERYTHING = 124, 150
 
 
-def show_fit(fitted: SourceFit, tolerance: float, saved: Path | None = None) -> None:
-    """Print a fit: spots, errors, transform, what was found."""
+def show_fit(
+    fitted: SourceFit, record: Mapping[str, Any], tolerance: float, saved: Path | None = None, page: Path | None = None
+) -> None:
+    """Print a fit: spots, errors, transform, what was found.
+
+    Parameters
+    ----------
+    fitted : SourceFit
+    record : mapping
+        The same as JSON values.
+    tolerance : float
+        [mm]
+    saved, page : Path, optional
+        Where the calibration and the result page were written.
+    """
     fit = fitted.fit
     kind = "should be" if fit.model.kind == "theory" else "really went"
     heading(f"{describe(fitted.source)} against {fitted.reference.path} (where it {kind})")
@@ -40,9 +55,12 @@ def show_fit(fitted: SourceFit, tolerance: float, saved: Path | None = None) -> 
     show_tool(fit)
     if fit.method == "paper":
         show_paper(fit)
-    _show_found(fit)
-    if saved is not None:
-        line(f"\nsaved {saved}")
+    _show_noise(fit)
+    beside = record.get("robust")
+    show_causes(fit.beside or fit, beside if isinstance(beside, Mapping) else record)
+    for path in (saved, page):
+        if path is not None:
+            line(f"\nsaved {path}")
 
 
 def describe(source: Source) -> str:
@@ -92,12 +110,15 @@ def _show_errors(fit: SpotFit, tolerance: float) -> None:
     after = "the paper's transform" if fit.method == "paper" else "rigid"
     if fit.model.tool_offset is not None:
         after = "rigid with a tool offset"
+    if fit.model.terms:
+        after = f"rigid with {', '.join(dict.fromkeys(term.effect for term in fit.model.terms))}"
     rows = [
         _errors("as found, no transform", fit.as_found),
         _errors("before: rigid, all spots, names as given", fit.before.residuals),
         _errors(f"after: {after}, {int(inliers.sum())} inliers, {kept}", rigid[inliers]),
         _errors("leave-one-out before", fit.before_loo),
         _errors("leave-one-out after", fit.after_loo),
+        *_nested(fit),
         _errors("for comparison: translation alone", fit.translation.residuals),
     ]
     if fit.method == "paper" and fit.beside is not None:
@@ -114,6 +135,15 @@ def _show_errors(fit: SpotFit, tolerance: float) -> None:
     table([Column("", number=False), Column("RMS"), Column("mean"), Column("max"), Column("n")], rows)
     within = int((np.linalg.norm(rigid, axis=1) <= tolerance).sum())
     line(f"{within} of {len(fit.ids)} spots within {tolerance:g} mm after")
+
+
+def _nested(fit: SpotFit) -> list[list[str]]:
+    """Errors of spots that took no part in choosing or fitting."""
+    found = fit.discovery
+    if not fit.model.terms or found is None or found.nested is None:
+        return []
+    judged = np.isfinite(found.nested).all(axis=1) & fit.robust.inliers
+    return [_errors("each fifth left out of choosing and fitting", found.nested[judged])]
 
 
 def _errors(title: str, vectors: Array) -> list[str]:
@@ -137,18 +167,7 @@ def _show_transform(fit: SpotFit) -> None:
     line(f"  {fit.support.verdict}")
 
 
-def _show_found(fit: SpotFit) -> None:
-    heading("what is left, and why")
-    effects = (fit.beside or fit).effects
-    for effect in effects:
-        word = "named" if effect.named else "consistent with"
-        rivals = f"; not separated from {', '.join(effect.not_separated_from)}" if effect.not_separated_from else ""
-        line(f"  {effect.name} ({word}{rivals}): {effect.remedy.text}")
-    if not effects:
-        line("  no effect found beyond the rigid transform")
-    trial = (fit.beside or fit).tool
-    if trial is not None and not trial.accepted and trial.figures is not None:
-        line(f"  tool_offset was tried and is not part of the model: {trial.verdict}")
+def _show_noise(fit: SpotFit) -> None:
     if fit.orientations is not None:
         line(f"  {fit.orientations.verdict}")
     sure = fit.uncertainty

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
-from respot.correction.chain import Chain, chain_of, stacked, standing
 from respot.correction.scope import Moving
 from respot.kinematics.cell import Reason, RobotCell
 from respot.kinematics.configuration import reconfigure
+from respot.kinematics.motion_chain import Chain, chain_of, stacked, standing
 from respot.languages import Language
 from respot.program.moves import Move
 

@@ -144,6 +144,13 @@ def convert(
             "fit again and convert, or fit with --effects swapped_ids"
         )
         raise BadInputError("BAD_OPTION", message, str(calibration or reference))
+    if model.terms:
+        names = ", ".join(term.label for term in model.terms)
+        message = (
+            f"the calibration has effects ({names}), which move each spot by itself: correcting programs by them is "
+            "not built yet; remove the cause and fit again, or fit with --effects swapped_ids"
+        )
+        raise BadInputError("BAD_OPTION", message, str(calibration or reference))
     if model.kind != "theory":
         message = (
             "a measured reference without effects registers two coordinate systems and has nothing to compensate; "

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
-from respot.correction.chain import Chain, chain_of, stacked, standing
 from respot.correction.points import new_offset
 from respot.geometry import IDENTITY, Array
 from respot.kinematics.cell import Reason, RobotCell
 from respot.kinematics.configuration import all_solutions, nearest_inside, taught_joints
+from respot.kinematics.motion_chain import Chain, chain_of, stacked, standing
 from respot.kinematics.opw import OpwRobot
 from respot.languages import Language
 from respot.program.moves import Motion, Move

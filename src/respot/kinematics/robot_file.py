@@ -60,6 +60,32 @@ def read_robot_file(path: Path) -> RobotModel:
         raise BadInputError("BAD_OPTION", f"no robot: {error}", str(path)) from error
 
 
+def robot_record(robot: RobotModel) -> dict[str, Any]:
+    """What `robot_from_record` makes the same robot of: the keys of a robot's file; limits are left out."""
+    if isinstance(robot, OpwRobot):
+        lengths = {name: float(getattr(robot, name)) for name in LENGTHS}
+        angles = {"offsets_deg": list(robot.offsets_deg), "signs": [int(sign) for sign in robot.signs]}
+        return {"name": robot.name, "convention": "opw", **lengths, **angles, "coupled_23": robot.coupled_23}
+    assert isinstance(robot, DhRobot)  # noqa: S101 - there are these two
+    links = [
+        {"a": link.a, "alpha": link.alpha, "d": link.d, "offset": link.offset}
+        | ({"type": "prismatic"} if link.prismatic else {})
+        for link in robot.links
+    ]
+    return {"name": robot.name, "convention": "mdh" if robot.modified else "dh", "link": links}
+
+
+def robot_from_record(record: Mapping[str, Any]) -> RobotModel:
+    """Robot of a record that `robot_record` made.
+
+    Raises
+    ------
+    ValueError, TypeError
+        The record describes no robot.
+    """
+    return _robot(record, "", "")
+
+
 def _robot(data: Mapping[str, Any], name: str, source: str) -> RobotModel:
     convention = data.get("convention")
     if convention not in _KEYS:

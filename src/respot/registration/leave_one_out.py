@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from respot.registration.rigid import COLLINEAR_TOLERANCE, check_pairs, rotations_from_covariance
+from respot.registration.errors import RegistrationError
+from respot.registration.rigid import COLLINEAR_TOLERANCE, check_pairs, fit_rigid, rotations_from_covariance
 
 Array = NDArray[np.float64]
 
@@ -50,4 +51,30 @@ def leave_one_out(source: ArrayLike, reference: ArrayLike, inliers: ArrayLike | 
     residuals: Array = np.einsum("nij,nj->ni", rotations, left - source_means) + reference_means - right
     undetermined = values[:, 1] + sign * values[:, 2] <= COLLINEAR_TOLERANCE**2 * values[:, 0]
     residuals[undetermined] = np.nan
+    return residuals
+
+
+def without_folds(source: ArrayLike, reference: ArrayLike, labels: ArrayLike) -> Array:
+    """Residual of each pair under the rigid least-squares fit of all pairs of other folds.
+
+    Parameters
+    ----------
+    source, reference : (n, 3) arrays [mm]
+    labels : (n,) array
+        Fold of each pair.
+
+    Returns
+    -------
+    (n, 3) array
+        Predicted minus reference [mm]. NaN where the others do not determine a transform.
+    """
+    first, second = check_pairs(source, reference)
+    fold = np.asarray(labels)
+    residuals = np.full_like(first, np.nan)
+    for name in np.unique(fold):
+        rest, out = fold != name, fold == name
+        try:
+            residuals[out] = fit_rigid(first[rest], second[rest]).predict(first[out]) - second[out]
+        except RegistrationError:
+            continue
     return residuals

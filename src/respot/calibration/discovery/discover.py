@@ -55,10 +55,11 @@ class Accepted:
 
 @dataclass(frozen=True, eq=False)
 class Hidden:
-    """An effect that these spots cannot show, and how much of it is seen beside the rigid part (0 to 1)."""
+    """An effect that these spots cannot show, and how much of it is seen beside what swallows it (0 to 1)."""
 
     term: Term
     share: float
+    absorbed_by: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,9 +78,11 @@ class Discovery:
     unexplained : Unexplained
     heldout : HeldOut
         Errors of the final structure by way to fold; the rigid part alone in ``heldout_before``.
-    nested_before, nested_after : (n, 3) arrays or None
-        Errors of spots that took no part in choosing or fitting, rigid part alone and with all that was chosen without
-        them, reference frame [mm]; NaN where a spot was never held out.
+    nested : (n, 3) array or None
+        Errors of spots that took no part in choosing or fitting, with all that was chosen without them, reference frame
+        [mm]; NaN where a spot was never held out.
+    nested_folds : (n,) int array or None
+        Which spots were held out together.
     """
 
     fit: JointFit
@@ -89,8 +92,8 @@ class Discovery:
     unexplained: Unexplained
     heldout: HeldOut
     heldout_before: HeldOut
-    nested_before: Array | None = None
-    nested_after: Array | None = None
+    nested: Array | None = None
+    nested_folds: NDArray[np.intp] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,9 +173,7 @@ def discover(
     accepted = tuple(replace(each, named=_named(each, left, found.fit, noise)) for each in accepted)
     before = fit_jointly(observations, reference, (), found.fit.inliers)
     progress()
-    nested_before = nested_after = None
-    if nested:
-        nested_before, nested_after = _nested(search, found.fit.inliers, draws)
+    labels = folds["mixed"]
     return Discovery(
         found.fit,
         accepted,
@@ -181,8 +182,8 @@ def discover(
         left,
         heldout(found.fit, folds),
         heldout(before, folds),
-        nested_before,
-        nested_after,
+        _nested(search, found.fit.inliers, labels, draws) if nested and accepted else None,
+        labels,
     )
 
 
@@ -206,7 +207,7 @@ def _prepared(
 
 
 def _aliases_of_tool(terms: Sequence[Term], columns: Array) -> tuple[int, ...]:
-    """Terms that move a spot by a constant in the tool: the last axis's zero, the flange's length. No spot tells them."""
+    """Terms that move spots by a constant in the tool: the last axis's zero, the flange's length."""
     tool = [number for number, term in enumerate(terms) if term.effect == "tool_offset"]
     if not tool:
         return ()
@@ -236,10 +237,7 @@ def _settle(search: _Search, inliers: Mask, draws: int) -> _Found:
         selection = Selection(
             bank, wanted, search.noise, search.allowed, draws=draws, seed=search.seed, step=search.step
         )
-        if len(rows) >= LEAST_SPOTS:
-            state = selection.search()
-        else:
-            state = selection.state((), 0.0)
+        state = selection.search() if len(rows) >= LEAST_SPOTS else selection.state((), 0.0)
         chosen = tuple(sorted(state.chosen))
         fit = fit_jointly(search.observations, search.reference, [search.terms[i] for i in chosen], inliers)
         found = _Found(selection, replace(state, chosen=chosen), fit)
@@ -368,27 +366,25 @@ def _hidden(search: _Search) -> tuple[Hidden, ...]:
     shares = bank.shares
     seen: dict[tuple[object, ...], Hidden] = {}
     for number, term in enumerate(search.terms):
-        if shares[number] < _HIDDEN or number in search.aliases:
-            seen.setdefault(term.key, Hidden(term, float(shares[number])))
+        if shares[number] < _HIDDEN:
+            seen.setdefault(term.key, Hidden(term, float(shares[number]), "the rigid transform"))
+        elif number in search.aliases:
+            seen.setdefault(term.key, Hidden(term, 0.0, "tool_offset"))
     return tuple(seen.values())
 
 
-def _nested(search: _Search, inliers: Mask, draws: int) -> tuple[Array, Array]:
-    """Errors (n, 3) of each fifth of the spots by a model that was chosen and fitted without it [mm]."""
-    count = len(search.observations)
-    before, after = np.full((count, 3), np.nan), np.full((count, 3), np.nan)
-    labels = folds_of(search.observations)["mixed"]
+def _nested(search: _Search, inliers: Mask, labels: NDArray[np.intp], draws: int) -> Array:
+    """Errors (n, 3) of each fold of spots by a model that was chosen and fitted without it [mm]."""
+    errors = np.full((len(search.observations), 3), np.nan)
     for fold in range(int(labels.max()) + 1):
         rest, out = np.flatnonzero(labels != fold), np.flatnonzero(labels == fold)
         if len(rest) < LEAST_SPOTS:
             continue
         part = search.rows(rest)
         found = _gated(part, _settle(part, inliers[rest], min(draws, _INNER_DRAWS)))
-        after[out] = _errors(search, found.fit, out)
-        rigid = fit_jointly(part.observations, part.reference, (), found.fit.inliers)
-        before[out] = _errors(search, rigid, out)
+        errors[out] = _errors(search, found.fit, out)
         search.step()
-    return before, after
+    return errors
 
 
 def _errors(search: _Search, fit: JointFit, out: NDArray[np.intp]) -> Array:

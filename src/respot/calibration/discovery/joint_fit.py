@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,21 +90,40 @@ class JointFit:
     @cached_property
     def inverse(self) -> Array:
         """Inverse of the normal matrix: the covariance for unit noise, in units of the priors."""
-        return np.linalg.pinv(self.normal, rcond=1e-13, hermitian=True)
+        return np.asarray(np.linalg.pinv(self.normal, rcond=1e-13, hermitian=True), dtype=np.float64)
 
     @cached_property
     def value_sd(self) -> tuple[Array, ...]:
         """Standard deviations of each term's values, in their units."""
         sd = self.sigma * np.sqrt(np.maximum(np.diag(self.inverse)[6:], 0.0)) * self.priors
-        stops = np.cumsum([len(value) for value in self.values])[:-1] if self.values else []
-        return tuple(np.split(sd, stops)) if self.values else ()
+        return split_by(sd, [len(value) for value in self.values])
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Covariance (6 + k, 6 + k) of the rigid part and the parameters.
+
+        The rigid part as a left perturbation about the inliers' calibrated centroid, tx, ty, tz [mm] and rx, ry, rz
+        [deg] along the axes of the reference frame; the parameters in their units.
+        """
+        turn = np.eye(6 + len(self.priors))
+        turn[:3, :3] = self.rotation
+        turn[3:6, 3:6] = self.rotation * np.degrees(1.0 / self.extent)
+        turn[6:, 6:] = np.diag(self.priors)
+        found = self.sigma**2 * turn @ self.inverse @ turn.T
+        return np.asarray((found + found.T) / 2.0)
 
     @property
     def linear(self) -> Array:
         """What the linear model about the solution is fitted to, source frame (n, 3) [mm]."""
-        at = np.concatenate([np.zeros(6), *[value for value in self.values]]) if self.values else np.zeros(6)
+        at = np.concatenate([np.zeros(6), *self.values]) if self.values else np.zeros(6)
         scaled = np.concatenate([at[:6], at[6:] / self.priors]) if len(self.priors) else at
         return np.asarray(self.columns @ scaled - self.in_source)
+
+
+def split_by(vector: Array, sizes: Sequence[int]) -> tuple[Array, ...]:
+    """Parts of a vector, of so many numbers each."""
+    stops = np.cumsum([0, *sizes]).tolist()
+    return tuple(vector[start:stop] for start, stop in pairwise(stops))
 
 
 def fit_jointly(
@@ -129,13 +149,12 @@ def fit_jointly(
     columns = np.concatenate([np.empty((len(points), 3, 6)), *blocks], axis=2)
     columns[:, :, 6:] *= priors
     sizes = [len(term.parameters) for term in terms]
-    stops = np.cumsum(sizes)[:-1] if sizes else []
     scaled = np.concatenate([*start]) / priors if start else np.zeros(len(priors))
     count = int(inliers.sum())
     sigma, free = 0.0, float(max(3 * count - 6, 1))
 
     def split(vector: Array) -> tuple[Array, ...]:
-        return tuple(np.split(vector * priors, stops)) if sizes else ()
+        return split_by(vector * priors, sizes)
 
     for _ in range(_TURNS):
         places, _rotations = moved(observations, terms, split(scaled))

@@ -77,7 +77,7 @@ def rival_table(
     own_directions = bank.directions(index, rest.basis, sigma)
     # of the same finding the form does not matter
     seen = {own.key}
-    found = []
+    found: list[tuple[Term, HeldOut, float, bool]] = []
     base = float(min(state.criterion, criteria[index]))
     for other in np.argsort(criteria).tolist():
         if not np.isfinite(criteria[other]) or len(found) == _SHOWN:

@@ -1,4 +1,4 @@
-"""The search for a set of terms: forward steps, each judged by permutations, then exchange, merge and backward steps."""
+"""The search for a set of terms: forward steps judged by permutations, then exchanges, merges, backward steps."""
 
 from __future__ import annotations
 
@@ -19,7 +19,11 @@ Mask = NDArray[np.bool_]
 MOST_EFFECTS = 6
 _LAST = 10.0
 """A term that only describes must be better by this much (as `Selection.criterion`) than one that may be a cause."""
+_EACH = 4.0
+"""What each effect costs beside its parameters: one cause before two."""
 _BETTER = 0.5
+_LARGE = 5
+"""Terms with more directions than this may stand for several causes at once."""
 _CANDIDATES = 12
 OBVIOUS = 12.0
 """Scores beyond this never come by chance: where only yes or no is asked, no permutations are needed."""
@@ -84,7 +88,7 @@ class Selection:
     ) -> None:
         self.bank, self.wanted, self.noise = bank, wanted, noise
         self.allowed, self.draws, self.seed, self._step = allowed, draws, seed, step
-        self._handicap = np.array([_LAST * MECHANISMS[term.effect].describes for term in bank.terms])
+        self._handicap = np.array([_EACH + _LAST * MECHANISMS[term.effect].describes for term in bank.terms])
         self._keys = [term.key for term in bank.terms]
 
     @property
@@ -94,7 +98,7 @@ class Selection:
 
     def free(self, state: State) -> int:
         """Degrees of freedom of a state's residual."""
-        return max(self.count - 6 - state.basis.shape[1], 1)
+        return max(self.count - 6 - int(state.basis.shape[1]), 1)
 
     def sigma(self, state: State) -> float:
         """Noise per coordinate that a state leaves [mm]; the known one where there is one and it is less."""
@@ -138,26 +142,29 @@ class Selection:
         sigma = self.sigma(self.state((), 0.0))
         state = self.state((), sigma)
         for _ in range(_ROUNDS):
-            grown = self._grow(state)
-            better = self._prune(self._improve(grown))
+            grown = self._split(self._improve(self._grow(state)))
+            better = self._prune(grown)
             if set(better.chosen) == set(state.chosen):
                 return better
             state = better
         return state
 
-    def _grow(self, state: State) -> State:
+    def _grow(self, state: State, among: Mask | None = None) -> State:
         """Forward steps, as long as the best term beats what the best of all gains by chance."""
         while len(state.chosen) < MOST_EFFECTS:
-            found = self._next(state)
+            found = self._next(state, among)
             if found is None:
                 break
-            state = self._exchange(self.state((*state.chosen, found), self.sigma(state)))
+            state = self.state((*state.chosen, found), self.sigma(state))
+            state = self._exchange(state, among)
             self._step()
         return state
 
-    def _next(self, state: State) -> int | None:
+    def _next(self, state: State, among: Mask | None) -> int | None:
         gains = self.bank.gains(state.basis, state.left, self.sigma(state))
         allowed = self.allowed & ~self._taken(state) & (gains.ranks > 0)
+        if among is not None:
+            allowed &= among
         if not allowed.any():
             return None
         score = np.where(allowed, scores(gains, state.left, self.free(state)), -np.inf)
@@ -208,13 +215,15 @@ class Selection:
         above = len(chance) - np.searchsorted(chance, score, side="left")
         return np.where(allowed, (1.0 + above) / (1.0 + len(chance)), 1.0)
 
-    def _exchange(self, state: State) -> State:
+    def _exchange(self, state: State, among: Mask | None = None) -> State:
         """Replace one term by another as long as the criterion falls."""
         for _ in range(4 * MOST_EFFECTS):
             best, changed = state, False
             for index in state.chosen:
                 rest = self.state([i for i in state.chosen if i != index], self.sigma(state))
                 criteria = self.beside(rest)
+                if among is not None:
+                    criteria = np.where(among, criteria, np.inf)
                 other = int(np.argmin(criteria))
                 if other != index and criteria[other] < best.criterion - _BETTER:
                     trial = self.state((*rest.chosen, other), self.sigma(state))
@@ -243,6 +252,18 @@ class Selection:
             if trial.criterion < best.criterion - _BETTER:
                 best = trial
         return self._exchange(best) if best is not state else state
+
+    def _split(self, state: State) -> State:
+        """Put several causes in the place of one term with many parameters, where that is better."""
+        for index in state.chosen:
+            rest = self.state([i for i in state.chosen if i != index], self.sigma(state))
+            if state.basis.shape[1] - rest.basis.shape[1] <= _LARGE:
+                continue
+            small = np.array([len(term.parameters) <= _LARGE + 1 for term in self.bank.terms])
+            trial = self._grow(rest, among=small & np.array([key != self._keys[index] for key in self._keys]))
+            if trial.criterion < state.criterion - _BETTER:
+                return trial
+        return state
 
     def _drop(self, state: State, keep: int) -> State:
         """Leave out terms as long as the criterion falls."""

@@ -19,7 +19,7 @@ DRAWS = 1000
 _AT_ONCE = 250
 
 
-def normal_score(squares: Array, ranks: Array, left: Array | float, free: int) -> Array:
+def normal_score(squares: Array, ranks: NDArray[np.intp], left: Array | float, free: int) -> Array:
     """Gains as normal scores, comparable over terms of different size: the F value by Wilson and Hilferty (1931).
 
     Parameters
@@ -31,7 +31,6 @@ def normal_score(squares: Array, ranks: Array, left: Array | float, free: int) -
     free : int
         Degrees of freedom before.
     """
-    ranks = np.asarray(ranks, dtype=np.float64)
     rest = np.maximum(free - ranks, 1.0)
     used = np.maximum(ranks, 1.0)
     ratio = (squares / used) / np.maximum((left - squares) / rest, 1e-300)

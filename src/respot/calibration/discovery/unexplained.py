@@ -15,7 +15,7 @@ from respot.calibration.observations import Observations
 Array = NDArray[np.float64]
 
 FLOOR = 1.1
-"""The noise floor is reached when what is left is at most this many times the noise that is known (DESIGN section 6)."""
+"""The floor is reached when what is left is at most this many times the known noise (DESIGN section 6)."""
 ALPHA = 0.01
 _DRAWS = 400
 _NEIGHBOURS = 3
@@ -105,7 +105,7 @@ def _correlates(vectors: Array, observations: Observations, seed: int) -> tuple[
     for name, features in _features(observations).items():
         tree = cKDTree(features)
         # equal values are near in any order: a hair of noise draws it
-        near = tree.query(features + 0.0, k=min(_NEIGHBOURS + 1, count))[1][:, 1:]
+        near = np.asarray(tree.query(features, k=min(_NEIGHBOURS + 1, count))[1])[:, 1:]
         alike = _alike(vectors[None], near)[0]
         by_chance = _alike(vectors[orders], near)
         p_value = float((1 + np.count_nonzero(by_chance >= alike)) / (1 + _DRAWS))

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from respot.calibration.effects.convention_text import remedy_text
+from respot.calibration.effects.convention_text import DOUBTS, remedy_text
 from respot.calibration.effects.effect import Effect, Remedy
 from respot.calibration.effects.readings import (
     Columns,
@@ -49,7 +49,8 @@ FAMILIES_KNOWN, FAMILIES_JOINT = 3, 4
 
 _SAME = 1.02  # what is left under two readings that are one on these spots
 _DUST_DEG = 1e-4  # printing
-_FRAME = "wrong_frame"
+_HALF_TURN_DEG = 3.0
+_FRAME, _HALF_TURN = DOUBTS
 _LABEL = {"source": "the source", "reference": "the reference"}
 
 
@@ -214,7 +215,7 @@ def investigate_convention(
                 f"orientations disagree by {before:.1f} degrees as written, and no other reading makes them agree{left}"
             )
             continue
-        return _accept(lists, before, best, tied, runner_up, turns[best.side])
+        return _accept(lists, written, best, tied, runner_up, turns[best.side])
     return ConventionTrial(None, verdict)
 
 
@@ -281,13 +282,14 @@ def rank(tried: Sequence[Tried], dust: float = _DUST_DEG) -> tuple[Tried | None,
 
 def _accept(
     lists: _Lists,
-    before: float,
+    written: Turns,
     best: Tried,
     tied: tuple[Tried, ...],
     runner_up: Tried | None,
     found: tuple[Rotations, Turns],
 ) -> ConventionTrial:
     read, turns = found
+    before = float(written.spread[0])
     inliers = turns.angles[best.row] <= 3.0 * best.spread + _DUST_DEG
     trusted = lists.rotations["reference" if best.side == "source" else "source"]
     needed = FAMILIES_JOINT if lists.registration is None else FAMILIES_KNOWN
@@ -309,9 +311,11 @@ def _accept(
         "families_at_least": families,
         "rows_not_judged": int(np.count_nonzero(~read.known[best.row])),
     }
-    finding = finding_of(
-        best, tied, runner_up, before, lists.kind, "deg", evidence, frame=frame <= TIED * best.spread + _DUST_DEG
-    )
+    doubts = [_FRAME] if frame <= TIED * best.spread + _DUST_DEG else []
+    near = max(_HALF_TURN_DEG, 3.0 * best.spread)
+    if bool(np.all(np.minimum(written.angles[0], np.abs(180.0 - written.angles[0]))[inliers] < near)):
+        doubts.append(_HALF_TURN)
+    finding = finding_of(best, tied, runner_up, before, lists.kind, "deg", evidence, doubts=doubts)
     finding = replace(finding, rotations=rotation_from_quaternion(quaternions), turn=np.degrees(right.as_rotvec()))
     return ConventionTrial(
         finding,
@@ -329,7 +333,7 @@ def finding_of(
     unit: Literal["deg", "mm"],
     evidence: dict[str, Any],
     *,
-    frame: bool = False,
+    doubts: Sequence[str] = (),
     named: bool = True,
     gain: float = 0.0,
 ) -> ConventionFinding:
@@ -343,8 +347,8 @@ def finding_of(
         Spread as written [unit].
     kind, unit, evidence
         For the record.
-    frame : bool
-        Whether the lists agree as written if one frame is turned.
+    doubts : sequence of str
+        What else explains it, of `respot.calibration.effects.convention_text.DOUBTS`.
     named : bool
         Whether it may be named if nothing is tied with it.
     gain : float
@@ -357,15 +361,15 @@ def finding_of(
     effect = Effect(
         name=NAME,
         where={"list": best.side if side_known else "either", "reading": best.reading.key},
-        named=named and not rivals and not frame,
+        named=named and not rivals and not doubts,
         remedy=Remedy(
             "spot_list",
-            remedy_text(best.side, best.reading, side_known, [each.reading for each in tied], frame, kind)
+            remedy_text(best.side, best.reading, side_known, [each.reading for each in tied], doubts, kind)
             + f" Spread as written {before:.2f} {unit}, read so {best.spread:.2f}"
             + ("." if runner_up is None else f", under the best other reading {runner_up.spread:.2f} {unit}."),
         ),
         heldout_gain=gain,
-        not_separated_from=(*(f"{NAME} ({key})" for key in rivals), *((_FRAME,) if frame else ())),
+        not_separated_from=(*(f"{NAME} ({key})" for key in rivals), *doubts),
         evidence={
             **evidence,
             "tied": list(labels),

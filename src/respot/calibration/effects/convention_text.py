@@ -13,8 +13,18 @@ _LISTS = {
     ("reference", "measured"): "the measured list",
 }
 
+DOUBTS = {
+    "wrong_frame": "A frame that is turned between positions and orientations would explain it as well.",
+    "half_turn": (
+        "Guns that are turned half round at some spots would explain it as well: the lists are 0 or 180 degrees apart."
+    ),
+}
+"""What else may explain it, by the name that ``not_separated_from`` gives it."""
 
-def remedy_text(side: str, reading: Reading, side_known: bool, tied: Sequence[Reading], frame: bool, kind: str) -> str:
+
+def remedy_text(
+    side: str, reading: Reading, side_known: bool, tied: Sequence[Reading], doubts: Sequence[str], kind: str
+) -> str:
     """Say which list it is, how it is written, and what to do, in full sentences.
 
     Parameters
@@ -26,8 +36,8 @@ def remedy_text(side: str, reading: Reading, side_known: bool, tied: Sequence[Re
         Whether the other list is right for sure.
     tied : sequence of Reading
         Readings that the spots do not tell from this one.
-    frame : bool
-        Whether a turned frame would do as well.
+    doubts : sequence of str
+        What else would explain it, of `DOUBTS`.
     kind : str
         ``"theory"`` or ``"measured"``.
     """
@@ -41,11 +51,7 @@ def remedy_text(side: str, reading: Reading, side_known: bool, tied: Sequence[Re
     others = list(dict.fromkeys(each.words for each in tied if each.key != reading.key))
     if others:
         what += f" These spots do not tell it from a list that {'; or '.join(others)}."
-    if frame:
-        what += (
-            " A frame that is turned between positions and orientations would explain it as well: these tools turn "
-            "about one axis only."
-        )
+    what += "".join(f" {DOUBTS[doubt]}" for doubt in doubts)
     how = "A, B, C in degrees with R = Rz(A) Ry(B) Rx(C)"
     if reading.columns == "quaternion":
         how = "quaternions q1..q4 with the scalar first, from tool to frame"

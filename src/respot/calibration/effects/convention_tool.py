@@ -20,7 +20,7 @@ from respot.calibration.effects.convention import (
     finding_of,
     rank,
 )
-from respot.calibration.effects.readings import Columns, Rotations, own_readings, read_all
+from respot.calibration.effects.readings import GIVEN, Columns, Rotations, own_readings, read_all
 from respot.calibration.effects.tool_fit import (
     LEAST_SPOTS,
     SCALE_FLOOR,
@@ -39,6 +39,7 @@ from respot.registration.robust import fit_robust
 from respot.registration.statistics import rms
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 Rows = NDArray[np.intp]
 
 LEAST = 12
@@ -47,6 +48,11 @@ HELD = 0.5
 """Families of orientations that took no part must be met this much better than as written, and without an offset."""
 
 _FIRMLY = 5
+_ROUGHLY = 0.5  # what the rough fit must gain, for a firm one to be tried
+_NEAR = 4.0
+_START = 40
+_NOTHING = 1e-9  # weight of a row whose numbers are not known
+_LEFT = 9  # spots that a fit without one family must keep
 _ROUNDS = 5
 _ROUGH_MM = 0.1
 _SAMPLE = 100
@@ -101,24 +107,29 @@ def investigate_by_tool(
         rigid = fit_robust(source, reference, seed=seed).rigid
     except RegistrationError as error:
         return ConventionTrial(None, str(error))
-    written = _fitted(source, rotations, reference, seed)
     alone = _spread(rigid.residuals)
-    before = alone if written is None else min(alone, _spread(written.residuals))
-    if before <= _DUST_MM:
+    if alone <= _DUST_MM:
         return ConventionTrial(None, "positions agree as written")
-    read = read_all(rotations, own_readings(columns), columns, numbers)
+    read = read_all(rotations, [GIVEN, *own_readings(columns)], columns, numbers)
     screened, tools = _screen(source, reference, read, canonical_order(source, reference))
+    before = min(alone, float(screened[0]))
+    nothing = f"no other reading of the source's orientations makes a tool offset fit (as written {before:.2f} mm)"
+    likely = [row for row in np.argsort(screened, kind="stable").tolist() if row and screened[row] < _ROUGHLY * before]
+    if not likely:
+        return ConventionTrial(None, nothing)
+    written = _fitted(source, rotations, reference, seed)
+    before = before if written is None else min(before, _spread(written.residuals))
     fits: dict[int, ToolFit] = {}
-    for row in np.argsort(screened, kind="stable")[:_FIRMLY].tolist():
+    for row in likely[:_FIRMLY]:
+        if screened[row] > _NEAR * screened[likely[0]]:
+            break
         fit = _fitted(source, Rotation.from_matrix(tools[row]), reference, seed)
-        if fit is not None and np.isfinite(screened[row]):
+        if fit is not None:
             fits[row] = fit
             screened[row] = min(screened[row], _spread(fit.residuals))
     best, tied, runner_up = rank(_tried(read, screened, fits), _DUST_MM)
-    if best is None or best.spread > CLEARLY * before:
-        return ConventionTrial(
-            None, f"no other reading of the source's orientations makes a tool offset fit (as written {before:.2f} mm)"
-        )
+    if best is None or best.row not in fits or best.spread > CLEARLY * before:
+        return ConventionTrial(None, nothing)
     turned = Rotation.from_matrix(tools[best.row])
     held = _held(fits[best.row], turned, source, reference, None if written is None else rotations, written)
     if held is None or held[1] > HELD * held[0]:
@@ -155,11 +166,12 @@ def _spread(residuals: Array) -> float:
 
 
 def _tried(read: Rotations, spreads: Array, fits: dict[int, ToolFit]) -> list[Tried]:
-    """Readings with what they leave; one that was not fitted firmly is no candidate, but may be tied."""
+    """Other readings with what they leave; one that was not fitted firmly is no candidate, but may be tied."""
     size = {row: float(np.linalg.norm(fit.offset)) for row, fit in fits.items()}
     return [
         Tried("source", reading, row, float(spreads[row]), size.get(row, np.inf))
         for row, reading in enumerate(read.readings)
+        if row
     ]
 
 
@@ -168,43 +180,80 @@ def _screen(source: Array, reference: Array, read: Rotations, order: Rows) -> tu
     k, n = read.known.shape
     sample = order[:: max(1, -(-n // _SAMPLE))]
     both = rotation_from_quaternion(read.quaternions.reshape(-1, 4)).as_matrix().reshape(k, 2, n, 3, 3)
-    tools = both[:, 0].copy()
-    known = read.known
-    few = known[:, sample].sum(axis=1) < max(LEAST_SPOTS, len(sample) // 2)
-    first, second = source[sample], reference[sample]
-    starts = [np.zeros((k, 3)), np.array([distance_start(first, each[sample], second, np.eye(3)) for each in tools])]
-    spreads = np.full(k, np.inf)
-    for offset in starts:
-        picked = np.zeros((k, n), dtype=np.intp)
-        weights = np.where(known[:, sample] | few[:, None], 1.0, 1e-9)
-        for _ in range(_ROUNDS):
-            turned = np.take_along_axis(both, picked[:, None, :, None, None], axis=1)[:, 0]
-            offset = _solve(first, turned[:, sample], second, weights, offset)
-            moved = first + np.einsum("knij,kj->kni", turned[:, sample], offset)
-            rotation, translation = transform_of(moved, np.broadcast_to(second, moved.shape), weights)
-            left = source + np.einsum("kfnij,kj->kfni", both, offset)
-            left = np.einsum("kij,kfnj->kfni", rotation, left) + translation[:, None, None] - reference
-            lengths = np.linalg.norm(left, axis=-1)
-            picked = np.argmin(lengths, axis=1)
-            nearest = np.take_along_axis(lengths, picked[:, None], axis=1)[:, 0]
-            scale = np.maximum(np.median(nearest, axis=1, keepdims=True), SCALE_FLOOR)
-            weights = np.where(known, 1.0 / np.square(1.0 + np.square(nearest / (2.0 * scale))), 1e-9)[:, sample]
-        now = np.array([_known_spread(row, mask) for row, mask in zip(nearest, known, strict=True)])
-        now[few] = np.inf
-        better = now < spreads
-        chosen = np.take_along_axis(both, picked[:, None, :, None, None], axis=1)[:, 0]
-        tools[better] = chosen[better]
-        spreads = np.where(better, now, spreads)
-    return spreads, tools
+    plain, together = np.zeros((k, n), dtype=np.intp), _together(read.quaternions)
+    folds = np.flatnonzero([reading.folds for reading in read.readings])
+    spreads, picked = np.full(k, np.inf), plain.copy()
+    for rows, start, near in (
+        (np.arange(k), plain, False),
+        (np.arange(k), plain, True),
+        (folds, together[folds], True),
+    ):
+        if not len(rows):
+            continue
+        now, way = _roughly(source, reference, both[rows], read.known[rows], start, sample, near)
+        better = now < spreads[rows]
+        spreads[rows[better]], picked[rows[better]] = now[better], way[better]
+    spreads[read.known[:, sample].sum(axis=1) < max(LEAST_SPOTS, len(sample) // 2)] = np.inf
+    return spreads, _pick(both, picked)
 
 
-def _solve(source: Array, tools: Array, reference: Array, weights: Array, start: Array) -> Array:
-    pair = (np.broadcast_to(each, tools.shape[:-1]) for each in (source, reference))
-    first, second = pair
-    return solve(first, tools, second, weights, start, np.eye(3), _ROUGH_MM)
+def _roughly(
+    source: Array, reference: Array, both: Array, known: Mask, picked: Rows, sample: Rows, far: bool
+) -> tuple[Array, Rows]:
+    """Spread (k,) of a fit by weights, and the foldings (k, n) that it came to.
+
+    Parameters
+    ----------
+    source, reference : (n, 3) arrays [mm]
+    both : (k, 2, n, 3, 3) array
+        Tool orientations under either folding.
+    known : (k, n) bool array
+    picked : (k, n) int array
+        Foldings to begin with.
+    sample : int array
+        Rows that are fitted.
+    far : bool
+        Begin where distances between spots say, not at no offset.
+    """
+    begin = sample[:: max(1, -(-len(sample) // _START))]
+    tools = _pick(both, picked)
+    offset = np.zeros((len(both), 3))
+    if far:
+        offset = np.array([distance_start(source[begin], each[begin], reference[begin], np.eye(3)) for each in tools])
+    first, second = (np.broadcast_to(each[sample], (len(both), len(sample), 3)) for each in (source, reference))
+    weights = np.where(known, 1.0, _NOTHING)[:, sample]
+    nearest = np.zeros(known.shape)
+    for _ in range(_ROUNDS):
+        tools = _pick(both, picked)[:, sample]
+        offset = solve(first, tools, second, weights, offset, np.eye(3), _ROUGH_MM)
+        moved = first + np.einsum("knij,kj->kni", tools, offset)
+        rotation, translation = transform_of(moved, second, weights)
+        left = source + np.einsum("kfnij,kj->kfni", both, offset)
+        left = np.einsum("kij,kfnj->kfni", rotation, left) + translation[:, None, None] - reference
+        lengths = np.linalg.norm(left, axis=-1)
+        picked = np.argmin(lengths, axis=1)
+        nearest = np.take_along_axis(lengths, picked[:, None], axis=1)[:, 0]
+        scale = np.maximum(np.median(nearest, axis=1, keepdims=True), SCALE_FLOOR)
+        weights = np.where(known, 1.0 / np.square(1.0 + np.square(nearest / (2.0 * scale))), _NOTHING)[:, sample]
+    spreads = [_known_spread(row, mask) for row, mask in zip(nearest, known, strict=True)]
+    return np.array(spreads), picked
 
 
-def _known_spread(lengths: Array, known: NDArray[np.bool_]) -> float:
+def _pick(both: Array, picked: Rows) -> Array:
+    return np.take_along_axis(both, picked[:, None, :, None, None], axis=1)[:, 0]
+
+
+def _together(quaternions: Array) -> Rows:
+    """Foldings (k, n) that bring each row nearest to the orientation from which the median row is least away."""
+    n = quaternions.shape[2]
+    rows = np.unique(np.linspace(0, n - 1, min(n, _START)).astype(np.intp))
+    centres = quaternions[:, :, rows].reshape(len(quaternions), -1, 4)
+    near = np.abs(np.einsum("kcq,kfnq->kcfn", centres, quaternions))
+    best = np.argmax(np.median(near.max(axis=2), axis=2), axis=1)
+    return np.asarray(np.argmax(near[np.arange(len(near)), best], axis=1), dtype=np.intp)
+
+
+def _known_spread(lengths: Array, known: Mask) -> float:
     return float(np.quantile(lengths[known], SHARE, method="lower")) if known.any() else np.inf
 
 
@@ -220,9 +269,10 @@ def _held(
 
     The better of as written and without an offset, and under the reading; None where that cannot be said.
     """
-    families = orientation_families(rotations, fit.inliers, canonical_order(source, reference))
-    if len(families) < 3:
-        return None
+    order = canonical_order(source, reference)
+    families = orientation_families(rotations, fit.inliers, order)
+    if len(families) < 3 or max(map(len, families)) > int(fit.inliers.sum()) - _LEFT:
+        families = [order[part::4] for part in range(4)]
     joint = leave_out(fit, source, rotations.as_matrix(), reference, families)
     alone, other = (np.full_like(joint, np.nan) for _ in range(2))
     for rows in families:

@@ -11,6 +11,8 @@ from respot.calibration.observations import Observations
 
 NAME = "deformation"
 PLAUSIBLE_MM = 5.0
+_CUBES = ((0, 0, 0), (1, 1, 1), (2, 2, 2), (0, 0, 1), (0, 0, 2), (1, 1, 0), (1, 1, 2), (2, 2, 0), (2, 2, 1), (0, 1, 2))
+_LEAST_FOR_CUBES = 40
 _STRAINS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
@@ -22,10 +24,15 @@ def _terms(observations: Observations) -> list[Term]:
     bend = tuple(
         Parameter(f"bend_{axis}_{'xyz'[i]}{'xyz'[j]}", "mm", PLAUSIBLE_MM) for i, j in _STRAINS for axis in "xyz"
     )
-    return [
-        Term(NAME, {}, strain, {**own, "order": 1}),
-        Term(NAME, {}, (*strain, *bend), {**own, "order": 2}),
-    ]
+    found = [Term(NAME, {}, strain, {**own, "order": 1}), Term(NAME, {}, (*strain, *bend), {**own, "order": 2})]
+    if len(observations) >= _LEAST_FOR_CUBES:
+        twist = tuple(
+            Parameter(f"twist_{axis}_{''.join('xyz'[i] for i in cube)}", "mm", PLAUSIBLE_MM)
+            for cube in _CUBES
+            for axis in "xyz"
+        )
+        found.append(Term(NAME, {}, (*strain, *bend, *twist), {**own, "order": 3}))
+    return found
 
 
 def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
@@ -37,12 +44,14 @@ def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
         if i != j:
             column[:, j] += even[:, i]
         columns.append(column)
-    if term.form["order"] == 2:
-        for i, j in _STRAINS:
-            for axis in range(3):
-                column = np.zeros_like(even)
-                column[:, axis] = even[:, i] * even[:, j]
-                columns.append(column)
+    powers: list[tuple[int, ...]] = []
+    if term.form["order"] >= 2:
+        powers += _STRAINS
+    if term.form["order"] == 3:
+        powers += _CUBES
+    for some in powers:
+        product = np.prod(even[:, list(some)], axis=1)
+        columns += [np.where(np.arange(3) == axis, product[:, None], 0.0) for axis in range(3)]
     return np.stack(columns, axis=-1)
 
 

@@ -12,8 +12,8 @@ from respot.calibration.observations import Observations
 DRIFT, WARMUP = "drift", "warmup"
 PLAUSIBLE_MM, PLAUSIBLE_DEG = 3.0, 0.2
 _SHARES = (0.03, 0.05, 0.08, 0.12, 0.18, 0.27, 0.4, 0.6)
-_SECOND = 4.0
-"""A motor warms faster than the arm: a second time constant is this many times the first."""
+_SECOND = (3.0, 8.0)
+"""A motor warms faster than the arm: a second time constant is so many times the first."""
 
 """Time constants that are tried, as shares of the measuring time."""
 
@@ -42,8 +42,9 @@ def _terms(observations: Observations, name: str) -> list[Term]:
                 found.append(Term(name, {"column": column}, (*shift, *turn, *bend), bent, own=column))
             if form:
                 slow = tuple(Parameter(f"{each.name}_slow", each.unit, each.prior) for each in (*shift, *turn))
-                two = {**own, "second_time_constant": _SECOND * form["time_constant"], "moves": "body"}
-                found.append(Term(name, {"column": column}, (*shift, *turn, *slow), two, own=column))
+                for times in _SECOND:
+                    two = {**own, "second_time_constant": times * form["time_constant"], "moves": "body"}
+                    found.append(Term(name, {"column": column}, (*shift, *turn, *slow), two, own=column))
     return found
 
 
@@ -68,12 +69,13 @@ def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
 def _remedy(term: Term, values: NDArray[np.float64]) -> Remedy:
     size = float(np.linalg.norm(values[:3]))
     if "time_constant" in term.form:
-        how = f"towards an end, {size:.2f} mm away, with a time constant of about {term.form['time_constant']:.0f} (column {term.where['column']})"
+        slow = f"a time constant of about {term.form['time_constant']:.0f}"
+        how = f"towards an end, {size:.2f} mm away, with {slow} (column {term.where['column']})"
     else:
         how = f"by {size:.2f} mm over the measurement (column {term.where['column']})"
     text = (
-        f"Spots move with time, {how}: robot, fixture or tracker were not yet warm, or one of them slipped. Measure again "
-        "after a warm-up run, with a fixed point measured in between; correct nothing before."
+        f"Spots move with time, {how}: robot, fixture or tracker were not yet warm, or one of them slipped. Measure "
+        "again after a warm-up run, with a fixed point measured in between; correct nothing before."
     )
     return Remedy("process", text)
 

@@ -19,10 +19,10 @@ class Remedy:
 
 @dataclass(frozen=True)
 class Rival:
-    """Another explanation that was tried, and its held-out RMS [mm]."""
+    """Another explanation that was tried, and its held-out RMS [mm]; None where no way to fold is fair to it."""
 
     name: str
-    heldout_rms: float
+    heldout_rms: float | None
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Effect:
     where: Mapping[str, Any]
     named: bool
     remedy: Remedy
-    heldout_gain: float
+    heldout_gain: float | None
     p_value: float | None = None
     parameters: Mapping[str, Any] = field(default_factory=dict)
     not_separated_from: tuple[str, ...] = ()

@@ -50,7 +50,8 @@ def _remedy(term: Term, values: NDArray[np.float64]) -> Remedy:
     size = float(np.hypot(values[0], values[1]))
     text = (
         f"The error of axis {axis} swings by {size:.4f} degrees, {waves} times a turn: a wheel of its gear runs out of "
-        "true, or its motor's encoder does. Look at the gear (noise, play, oil); until it is changed correct the points."
+        "true, or its motor's encoder does. Look at the gear (noise, play, oil); until it is changed correct the "
+        "points."
     )
     return Remedy("robot", text)
 

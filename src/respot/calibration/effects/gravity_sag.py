@@ -68,12 +68,12 @@ def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
     return columns
 
 
-def _remedy(term: Term, values: NDArray[np.float64]) -> Remedy:
+def _remedy(term: Term, values: NDArray[np.float64]) -> Remedy:  # noqa: ARG001 - a basis, no stiffness
     axes = " and ".join(str(axis) for axis in term.where["axes"])
     text = (
-        f"The arm gives way under its load at axis {axes}. Check the load data of the tool (mass, centre of mass) in the "
-        "controller, and the counterbalance; if they are right, correct the points. The columns are a basis of levers: "
-        "the single coefficients are no stiffness."
+        f"The arm gives way under its load at axis {axes}. Check the load data of the tool (mass, centre of mass) in "
+        "the controller, and the counterbalance; if they are right, correct the points. The columns are a basis of "
+        "levers: the single coefficients are no stiffness."
     )
     return Remedy("robot", text)
 

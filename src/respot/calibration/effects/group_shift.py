@@ -62,9 +62,9 @@ def _remedy(term: Term, values: NDArray[np.float64]) -> Remedy:
     x, y, z = values[:3].tolist()
     turned = "" if len(values) == 3 else f", and turned by {float(np.linalg.norm(values[3:])):.3f} degrees"
     text = (
-        f"{term.where['column']} {term.where['level']} stands {x:+.2f} {y:+.2f} {z:+.2f} mm from the others{turned}. Was "
-        "its fixture moved, or its base or work object measured anew? Measure that frame again and correct it there; "
-        "without a frame of its own correct its points."
+        f"{term.where['column']} {term.where['level']} stands {x:+.2f} {y:+.2f} {z:+.2f} mm from the others{turned}. "
+        "Was its fixture moved, or its base or work object measured anew? Measure that frame again and correct it "
+        "there; without a frame of its own correct its points."
     )
     return Remedy("base", text)
 

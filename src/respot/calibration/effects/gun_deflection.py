@@ -23,9 +23,16 @@ def _terms(observations: Observations) -> list[Term]:
             form = {"full": float(np.abs(column.values).max())}
             one = (Parameter("z", "mm", PLAUSIBLE_MM),)
             found.append(Term(NAME, {"column": name}, one, {**form, "along": "z", "power": 1}, own=name))
+            two = (*one, Parameter("bend_z", "mm", PLAUSIBLE_MM))
+            found.append(Term(NAME, {"column": name}, two, {**form, "along": "z", "power": 2}, own=name))
             even, bent = vector("", "mm", PLAUSIBLE_MM), vector("bend_", "mm", PLAUSIBLE_MM)
             found.append(Term(NAME, {"column": name}, even, {**form, "along": "any", "power": 1}, own=name))
             found.append(Term(NAME, {"column": name}, (*even, *bent), {**form, "along": "any", "power": 2}, own=name))
+            # closed already without force: a constant goes with it
+            closed = {**form, "power": 1, "preload": True}
+            start = vector("closed_", "mm", PLAUSIBLE_MM)
+            found.append(Term(NAME, {"column": name}, (start[_Z], *one), {**closed, "along": "z"}, own=name))
+            found.append(Term(NAME, {"column": name}, (*start, *even), {**closed, "along": "any"}, own=name))
     return found
 
 
@@ -34,21 +41,24 @@ def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
     assert force is not None  # noqa: S101 - the term was made of it
     share = (force / term.form["full"])[:, None, None]
     # play in the gun is taken up first: it need not be proportional
-    powers = [observations.tools * share**power for power in range(1, term.form["power"] + 1)]
+    lowest = 0 if term.form.get("preload") else 1
+    powers = [observations.tools * share**power for power in range(lowest, term.form["power"] + 1)]
     columns = np.concatenate(powers, axis=2)
-    return columns[:, :, _Z:] if term.form["along"] == "z" else columns
+    if term.form["along"] == "z":
+        columns = columns[:, :, _Z::3]
+    return np.asarray(columns, dtype=np.float64)
 
 
 def _at_full(term: Term, values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Deflection at the highest force, along the tool's axes [mm]."""
-    return values if term.form["along"] == "z" else values.reshape(-1, 3).sum(axis=0)
+    return values.sum(keepdims=True) if term.form["along"] == "z" else values.reshape(-1, 3).sum(axis=0)
 
 
 def _remedy(term: Term, values: NDArray[np.float64]) -> Remedy:
     text = (
-        f"The weld moves by {float(np.linalg.norm(_at_full(term, values))):.2f} mm in the tool at the highest force of column "
-        f"{term.where['column']}: the gun bends as it squeezes. Enter the gun's deflection in its data (KUKA: ServoGun "
-        "compensation, ABB: the tool's force calibration), or correct the points; never both."
+        f"The weld moves by {float(np.linalg.norm(_at_full(term, values))):.2f} mm in the tool at the highest force of "
+        f"column {term.where['column']}: the gun bends as it squeezes. Enter the gun's deflection in its data (KUKA: "
+        "ServoGun compensation, ABB: the tool's force calibration), or correct the points; never both."
     )
     return Remedy("tool", text)
 

@@ -26,7 +26,7 @@ def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
     tools = observations.tools
     weight = np.einsum("nij,i->nj", tools, observations.gravity)  # gravity along the tool's axes
     if term.form["compliance"] == "docking":
-        return np.einsum("nij,nk->nijk", tools, weight).reshape(len(tools), 3, 9)
+        return np.asarray(np.einsum("nij,nk->nijk", tools, weight).reshape(len(tools), 3, 9))
     columns = [
         tools[:, :, i] * weight[:, j, None] + (tools[:, :, j] * weight[:, i, None] if i != j else 0.0)
         for i, j in _PAIRS
@@ -36,8 +36,8 @@ def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
 
 def _remedy(term: Term, values: NDArray[np.float64]) -> Remedy:  # noqa: ARG001 - one place only
     text = (
-        f"The gun hangs: its tip gives way by about {np.abs(values).max():.2f} mm as the gun is turned against gravity. "
-        "Check the bolts of gun and tool changer and the gun's balancing; then correct the points."
+        f"The gun hangs: its tip gives way by about {np.abs(values).max():.2f} mm as the gun is turned against "
+        "gravity. Check the bolts of gun and tool changer and the gun's balancing; then correct the points."
     )
     return Remedy("tool", text)
 

@@ -65,9 +65,9 @@ def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
 def _remedy(term: Term, values: NDArray[np.float64]) -> Remedy:
     axis = term.where["axis"]
     text = (
-        f"The error of axis {axis} changes with its angle, by up to about {np.abs(values[1:]).sum():.3f} degrees over the "
-        "range of these spots. Look at the gear ratio and the counterbalance of this axis (gas pressure, spring); if "
-        "they are in order, correct the points."
+        f"The error of axis {axis} changes with its angle, by up to about {np.abs(values[1:]).sum():.3f} degrees over "
+        "the range of these spots. Look at the gear ratio and the counterbalance of this axis (gas pressure, spring); "
+        "if they are in order, correct the points."
     )
     return Remedy("robot", text)
 

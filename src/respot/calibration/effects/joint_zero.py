@@ -34,9 +34,9 @@ def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
 def _remedy(term: Term, values: NDArray[np.float64]) -> Remedy:
     axis, unit = term.where["axis"], term.parameters[0].unit
     text = (
-        f"Axis {axis} really stands {values[0]:+.4f} {unit} from what the controller shows. Check its mastering mark or "
-        "its fine calibration; was a motor, gear or encoder changed? Re-master the axis, or correct the points: never "
-        "both."
+        f"Axis {axis} really stands {values[0]:+.4f} {unit} from what the controller shows. Check its mastering mark "
+        "or its fine calibration; was a motor, gear or encoder changed? Re-master the axis, or correct the points: "
+        "never both."
     )
     return Remedy("robot", text)
 

@@ -52,6 +52,25 @@ def moved(observations: Observations, terms: Sequence[Term], values: Sequence[Ar
     return points, rotations
 
 
+def missing(observations: Observations, term: Term) -> str:
+    """Say what observations lack that a term needs; empty if nothing."""
+    mechanism = MECHANISMS[term.effect]
+    column = str(term.where.get("column", ""))
+    if column and column not in observations.columns:
+        return f"the column {column}"
+    if mechanism.acts in ("joints", "arm") and not observations.has_arm:
+        return "joints and a robot model"
+    if (mechanism.acts == "tool" or term.form.get("frame") == "tool") and observations.rotations is None:
+        return "the orientation of the tool"
+    if term.effect == "readback_lag" and observations.measured_joints is None:
+        return "measured joints"
+    if term.effect == "backlash" and observations.approach is None:
+        return f"the column {term.own}"
+    if term.effect == "rail" and observations.external_axes is None:
+        return "external axes"
+    return ""
+
+
 def _through_arm(term: Term) -> bool:
     return MECHANISMS[term.effect].acts == "joints" or term.effect == "link_length"
 

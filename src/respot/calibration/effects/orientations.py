@@ -6,7 +6,6 @@ at afterwards, and what they say is reported.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from respot.geometry import abc_from_rotation, quaternion_from_rotation, rotation_from_abc, rotation_from_quaternion
+from respot.calibration.effects.convention import ConventionFinding, find_convention
+from respot.calibration.effects.readings import Columns
 
 Array = NDArray[np.float64]
 
@@ -22,8 +22,6 @@ TURN_DEG = 0.5
 """A constant turn below this is the scatter of orientations."""
 SCATTER_DEG = 5.0
 """Above this (RMS about the constant turn) the two lists do not mean the same orientations."""
-_CLEARLY = 0.2  # another reading must scatter this much less than the given one
-_LEAST = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +78,16 @@ def _rms(angles: Array) -> float:
     return float(np.sqrt(np.mean(angles**2)))
 
 
-def compare_orientations(rotation: Array, source: Rotation, reference: Rotation) -> OrientationFit:
+def compare_orientations(
+    rotation: Array,
+    source: Rotation,
+    reference: Rotation,
+    *,
+    kind: str = "measured",
+    source_columns: Columns = "abc",
+    reference_columns: Columns = "abc",
+    finding: ConventionFinding | None = None,
+) -> OrientationFit:
     """Compare orientations under the rotation that the positions gave.
 
     Parameters
@@ -88,21 +95,32 @@ def compare_orientations(rotation: Array, source: Rotation, reference: Rotation)
     rotation : (3, 3) array
         Source to reference.
     source, reference : Rotation of n
-        Tool orientations of the same spots, each in its own frame.
+        Tool orientations of the same spots, each in its own frame, as they were read.
+    kind : str
+        ``"theory"`` or ``"measured"``.
+    source_columns, reference_columns : "abc" or "quaternion"
+        What each list is written in.
+    finding : ConventionFinding, optional
+        Of the effect ``convention``, where it is known already; searched for otherwise.
     """
     turned = Rotation.from_matrix(rotation) * source
     found, after = _angles(source, reference), _angles(turned, reference)
     turn, scatter = _constant_turn(rotation, source, reference)
     angle = float(np.linalg.norm(turn))
-    convention = code = None
-    if len(after) >= _LEAST and _rms(scatter) > SCATTER_DEG:
-        convention = _other_reading(rotation, source, reference, _rms(scatter))
-    if convention is not None:
-        code = "ORIENTATION_CONVENTION"
-        verdict = (
-            f"orientations disagree by {_rms(scatter):.1f} degrees (RMS), and agree if {convention}: the convention of "
-            "that list is probably wrong. Positions are not touched by it"
+    code = None
+    if finding is None and _rms(scatter) > SCATTER_DEG:
+        finding = find_convention(
+            source,
+            reference,
+            registration=rotation,
+            kind=kind,
+            source_columns=source_columns,
+            reference_columns=reference_columns,
         )
+    convention = None if finding is None else finding.text
+    if finding is not None:
+        code = "ORIENTATION_CONVENTION"
+        verdict = _convention_text(finding, _rms(scatter))
     elif _rms(scatter) > SCATTER_DEG:
         code = "ORIENTATIONS_DISAGREE"
         verdict = (
@@ -122,6 +140,15 @@ def compare_orientations(rotation: Array, source: Rotation, reference: Rotation)
     return OrientationFit(found, after, turn, scatter, convention, code, verdict)
 
 
+def _convention_text(finding: ConventionFinding, scatter: float) -> str:
+    unsure = "" if finding.side_known else ", or the other list does: orientations alone cannot tell which"
+    others = "" if finding.effect.named else " (other readings or a turned frame would do as well on these spots)"
+    return (
+        f"orientations disagree by {scatter:.1f} degrees (RMS), and agree if {finding.text}{unsure}{others}: the "
+        "convention of that list is probably wrong. Positions are not touched by it"
+    )
+
+
 def _angles(first: Rotation, second: Rotation) -> Array:
     return np.asarray(np.degrees((first.inv() * second).magnitude()), dtype=np.float64)
 
@@ -130,52 +157,3 @@ def _constant_turn(rotation: Array, source: Rotation, reference: Rotation) -> tu
     between = (Rotation.from_matrix(rotation) * source).inv() * reference
     mean = between.mean()
     return np.degrees(mean.as_rotvec()), np.asarray(np.degrees((mean.inv() * between).magnitude()), dtype=np.float64)
-
-
-def _other_reading(rotation: Array, source: Rotation, reference: Rotation, given: float) -> str | None:
-    """The reading of one list that makes the two agree far better than as given; None where there is none."""
-    best, name = _CLEARLY * given, None
-    for words, reading in READINGS:
-        for which, first, second in (
-            ("source", reading(source), reference),
-            ("reference", source, reading(reference)),
-        ):
-            scatter = _rms(_constant_turn(rotation, first, second)[1])
-            if scatter < best:
-                best, name = scatter, f"the {which} {words}"
-    return name
-
-
-def _angles_read_as(order: str) -> Callable[[Rotation], Rotation]:
-    def reading(rotations: Rotation) -> Rotation:
-        return Rotation.from_euler(order, abc_from_rotation(rotations), degrees=True)
-
-    return reading
-
-
-def _scalar_last(rotations: Rotation) -> Rotation:
-    return rotation_from_quaternion(np.roll(quaternion_from_rotation(rotations), 1, axis=-1))
-
-
-def _radians(rotations: Rotation) -> Rotation:
-    return Rotation.from_euler("ZYX", abc_from_rotation(rotations))
-
-
-def _signs(a: float, b: float, c: float) -> Callable[[Rotation], Rotation]:
-    def reading(rotations: Rotation) -> Rotation:
-        return rotation_from_abc(abc_from_rotation(rotations) * [a, b, c])
-
-    return reading
-
-
-READINGS: tuple[tuple[str, Callable[[Rotation], Rotation]], ...] = (
-    ("has A about x and C about z (roll, pitch, yaw)", _angles_read_as("xyz")),
-    ("has its angles about moving x, y, z", _angles_read_as("XYZ")),
-    ("has its angles about fixed z, y, x", _angles_read_as("zyx")),
-    ("has its quaternions scalar last", _scalar_last),
-    ("has the inverse orientations (reference to tool)", lambda rotations: rotations.inv()),
-    ("has its angles in radians", _radians),
-    ("has the sign of A turned round", _signs(-1.0, 1.0, 1.0)),
-    ("has the sign of B turned round", _signs(1.0, -1.0, 1.0)),
-    ("has the sign of C turned round", _signs(1.0, 1.0, -1.0)),
-)

@@ -157,6 +157,9 @@ def _quaternion(order: Sequence[int], conjugate: bool = False) -> Callable[[Arra
 
 _LAST = (3, 0, 1, 2)
 
+GIVEN = Reading(AS_WRITTEN, "is written as it was read", None, _quaternion((0, 1, 2, 3)))
+"""Our own convention."""
+
 READINGS: tuple[Reading, ...] = (
     Reading("inverse", "has the inverse orientations (reference to tool)", None, _quaternion((0, 1, 2, 3), True)),
     Reading(

@@ -37,9 +37,10 @@ def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
 def _remedy(term: Term, values: NDArray[np.float64]) -> Remedy:
     x, y, z = values.reshape(-1, 3).sum(axis=0).tolist()
     text = (
-        f"The point of contact moves by {x:+.2f} {y:+.2f} {z:+.2f} mm in the tool until {term.form['full']:g} of column "
-        f"{term.where['column']}: tips wear and are dressed shorter; only a new cap resets it. Switch on the controller's "
-        "wear compensation, or change caps earlier. Do not correct points for it: a new cap would undo that."
+        f"The point of contact moves by {x:+.2f} {y:+.2f} {z:+.2f} mm in the tool until {term.form['full']:g} of "
+        f"column {term.where['column']}: tips wear and are dressed shorter; only a new cap resets it. Switch on the "
+        "controller's wear compensation, or change caps earlier. Do not correct points for it: a new cap would undo "
+        "that."
     )
     return Remedy("process", text)
 

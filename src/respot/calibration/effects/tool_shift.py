@@ -27,9 +27,9 @@ def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:  # 
 def _remedy(term: Term, values: NDArray[np.float64]) -> Remedy:  # noqa: ARG001
     x, y, z = values.tolist()
     text = (
-        f"The TCP is {x:+.2f} {y:+.2f} {z:+.2f} mm from where the tool data have it, along the tool's axes. Measure the "
-        "TCP again; if it is confirmed, add the offset to the tool (KUKA: TOOL_DATA, ABB: tframe.trans of the tooldata) "
-        "and fit again. Correct the tool or the points, never both."
+        f"The TCP is {x:+.2f} {y:+.2f} {z:+.2f} mm from where the tool data have it, along the tool's axes. Measure "
+        "the TCP again; if it is confirmed, add the offset to the tool (KUKA: TOOL_DATA, ABB: tframe.trans of the "
+        "tooldata) and fit again. Correct the tool or the points, never both."
     )
     return Remedy("tool", text)
 

@@ -23,6 +23,7 @@ and a fifth of the spots that alone tell two readings apart is not overlooked.""
 _CANDIDATES = 40
 _ANCHORS = 8
 _JUDGES = 200
+_WITNESSES = 60
 _TURNS = 12
 _FINEST = 1e-9  # radians
 
@@ -194,11 +195,12 @@ def _chosen(whole: Array, source: Array, reference: Array) -> tuple[Rows, Array,
 def _best_start(source: Array, reference: Array, known: Mask) -> Array:
     """Left turns (k, 4) from the spot as seen from which the lists agree best."""
     n = source.shape[2]
-    rows, judges = _even(n, _ANCHORS), _even(n, _JUDGES)
+    rows, judges = _even(n, _ANCHORS), _even(n, _WITNESSES)
     lefts: list[Array] = []
     costs: list[Array] = []
+    folded = not (np.array_equal(source[:, 0], source[:, 1]) and np.array_equal(reference[:, 0], reference[:, 1]))
     for row in rows:
-        for folding in (0, 1):
+        for folding in (0, 1) if folded else (0,):
             one = product(source[:, :, judges], inverse(source[:, folding, row])[:, None, None, :])
             two = product(reference[:, :, judges], inverse(reference[:, folding, row])[:, None, None, :])
             fits = np.argmin(np.abs(np.abs(one[..., 0]) - np.abs(two[..., 0])), axis=1)[:, None, :, None]

@@ -1,0 +1,175 @@
+"""What causes the residuals of paired spots: names first, then the tool and all other effects."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from respot.calibration.discovery.discover import LEAST_SPOTS, Discovery, discover
+from respot.calibration.discovery.records import effects_of
+from respot.calibration.effects import EFFECTS, swapped_ids, tool_offset
+from respot.calibration.effects.catalogue import MECHANISMS
+from respot.calibration.effects.search import Effects, search_effects
+from respot.calibration.effects.tool_offset import ToolTrial
+from respot.calibration.observations import Observations
+from respot.registration.errors import RegistrationError
+from respot.registration.exchanged import ExchangeResult, find_exchanged
+from respot.registration.robust import fit_robust
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
+Observe = Callable[[Rows], Observations]
+"""Observations of the pairs, for a permutation (n,) of the reference's rows: names that are exchanged back."""
+
+
+@dataclass(frozen=True, eq=False)
+class Causes:
+    """What was found.
+
+    Attributes
+    ----------
+    exchanged : ExchangeResult
+        Names; ``robust`` is of the spots moved by an accepted tool offset.
+    trial : ToolTrial or None
+        The tool offset by itself, where it was looked for; accepted only if discovery, where it ran, has it and nothing
+        beside.
+    discovery : Discovery or None
+        All other effects, where they were looked for.
+    observations : Observations or None
+        What discovery saw.
+    """
+
+    exchanged: ExchangeResult
+    trial: ToolTrial | None
+    discovery: Discovery | None = None
+    observations: Observations | None = None
+
+    @property
+    def in_model(self) -> Discovery | None:
+        """The discovery, if its effects are the model."""
+        alone = self.trial is not None and self.trial.accepted
+        return self.discovery if self.discovery is not None and self.discovery.accepted and not alone else None
+
+
+def every_effect() -> tuple[str, ...]:
+    """Names of all effects, in the order in which they are looked for."""
+    return tuple(dict.fromkeys([*EFFECTS, *MECHANISMS]))
+
+
+def names_of(effects: Effects) -> tuple[str, ...]:
+    """Names of the effects to look for.
+
+    Raises
+    ------
+    RegistrationError
+        ``BAD_OPTION`` for a name that no effect has.
+    """
+    known = every_effect()
+    names = known if effects == "auto" else tuple(effects)
+    for name in names:
+        if name not in known:
+            raise RegistrationError("BAD_OPTION", f"there is no effect {name!r}; there are {', '.join(known)}")
+    return names
+
+
+def find_causes(
+    ids: Sequence[str],
+    source: Array,
+    reference: Array,
+    rotations: Rotation | None,
+    effects: Effects,
+    observe: Observe | None,
+    *,
+    kind: str,
+    noise: float | None,
+    seed: int,
+    nested: bool = True,
+    progress: Callable[[], None] = lambda: None,
+) -> Causes:
+    """Look for causes among paired spots.
+
+    Parameters
+    ----------
+    ids, source, reference, rotations, kind, noise, seed
+        As `respot.calibration.effects.search.search_effects`.
+    effects : "auto" or names
+    observe : callable, optional
+        What else is known of the pairs; default their poses alone.
+    nested : bool
+        As `respot.calibration.discovery.discover.discover`.
+    progress : callable
+        Called as the work goes on.
+
+    Raises
+    ------
+    RegistrationError
+        As `names_of` and `search_effects`.
+    """
+    looked_for = names_of(effects)
+    simple: Effects = "auto" if effects == "auto" else tuple(name for name in looked_for if name in EFFECTS)
+    exchanged, trial = search_effects(ids, source, reference, rotations, simple, kind=kind, noise=noise, seed=seed)
+    others = frozenset(name for name in looked_for if name in MECHANISMS)
+    if others <= {tool_offset.NAME} or len(ids) < LEAST_SPOTS:
+        return Causes(exchanged, trial)
+
+    def look(names: ExchangeResult) -> tuple[Discovery, Observations]:
+        seen = Observations(source, rotations) if observe is None else observe(names.permutation)
+        repaired = reference[names.permutation]
+        start = names.robust.inliers
+        found = discover(
+            seen,
+            repaired,
+            inliers=start,
+            noise=noise,
+            seed=seed,
+            effects=others,
+            nested=nested,
+            progress=progress,
+        )
+        return found, seen
+
+    found, seen = look(exchanged)
+    if found.accepted and swapped_ids.NAME in looked_for:
+        again = find_exchanged(ids, found.fit.moved, reference, seed=seed)
+        if not np.array_equal(again.permutation, exchanged.permutation):
+            exchanged = again
+            found, seen = look(exchanged)
+    return Causes(*_settled(ids, source, reference, exchanged, trial, found, looked_for, seed), found, seen)
+
+
+def _settled(
+    ids: Sequence[str],
+    source: Array,
+    reference: Array,
+    exchanged: ExchangeResult,
+    trial: ToolTrial | None,
+    found: Discovery,
+    looked_for: Sequence[str],
+    seed: int,
+) -> tuple[ExchangeResult, ToolTrial | None]:
+    """Names and the tool's own trial, with what discovery says of the tool."""
+    accepted = [each.term.effect for each in found.accepted]
+    if trial is None or not trial.accepted:
+        return exchanged, trial
+    if accepted == [tool_offset.NAME] and trial.effect is not None:
+        own = effects_of(found)[0]
+        effect = replace(
+            trial.effect,
+            named=trial.effect.named and own.named,
+            p_value=own.p_value,
+            not_separated_from=tuple(dict.fromkeys([*trial.effect.not_separated_from, *own.not_separated_from])),
+            rivals=(*trial.effect.rivals, *own.rivals[1:]),
+        )
+        return exchanged, replace(trial, effect=effect)
+    verdict = "beside all other effects a tool offset is not needed" if accepted else "chance explains as much"
+    trial = replace(trial, accepted=False, effect=None, verdict=verdict)
+    if accepted:
+        return exchanged, trial
+    if swapped_ids.NAME in looked_for:
+        return find_exchanged(ids, source, reference, seed=seed), trial
+    keep = np.arange(len(ids), dtype=np.intp)
+    return ExchangeResult((), keep, fit_robust(source, reference, seed=seed)), trial

@@ -1,0 +1,89 @@
+"""What a fit found and did not find, on the terminal: causes, rivals, what is hidden, what to measure next."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from respot.cli.display import Column, heading, line, table
+from respot.figures.verdict import verdict
+from respot.figures.words import chance, effect_noun, figure, listing, place, separation, value_text
+
+if TYPE_CHECKING:
+    from respot.calibration.spot_fit import SpotFit
+
+_MOST_PARAMETERS = 9
+_MOST_TRIED = 6
+
+
+def show_causes(fit: SpotFit, record: Mapping[str, Any]) -> None:
+    """Print what is left and why.
+
+    Parameters
+    ----------
+    fit : SpotFit
+    record : mapping
+        The same as JSON values (of a method for comparison: of our fit beside it).
+    """
+    heading("what is left, and why")
+    effects = record["effects"]
+    for effect in effects:
+        word = "named" if effect["named"] else "consistent with"
+        line(f"  {effect['name']} {place(effect['where'])} ({word}): {effect['remedy']['text']}")
+        if effect["name"] not in ("swapped_ids", "tool_offset", "convention"):
+            _show_evidence(effect)
+    if not effects:
+        line("  no effect found beyond the rigid transform")
+    _show_lost(fit, record)
+    _show_unknown(record)
+    if effects:
+        said = verdict(record)
+        heading("in short")
+        line(f"  {said.headline}")
+        for text in (said.error, said.advice):
+            if text:
+                line(f"  {text}")
+
+
+def _show_evidence(effect: Mapping[str, Any]) -> None:
+    parameters = list(effect["parameters"].items())
+    for name, parameter in parameters[:_MOST_PARAMETERS]:
+        line(f"      {name:16} {value_text(parameter['value'], parameter['ci95'], parameter['unit'])}")
+    if len(parameters) > _MOST_PARAMETERS:
+        line(f"      and {len(parameters) - _MOST_PARAMETERS} more (--json)")
+    line(f"      by luck alone as much: {chance(effect['p_value'])}; {separation(effect)}")
+    rows = [["with it", figure(effect["evidence"].get("heldout_rms"), 3)]]
+    rows += [[_rival(rival["name"]), figure(rival["heldout_rms"], 3)] for rival in effect["rivals"]]
+    table([Column("      in its place", number=False), Column("held-out RMS")], [[f"      {a}", b] for a, b in rows])
+
+
+def _rival(name: str) -> str:
+    return name if name == "without it" else effect_noun(name)
+
+
+def _show_lost(fit: SpotFit, record: Mapping[str, Any]) -> None:
+    trial = fit.tool
+    if trial is not None and not trial.accepted and trial.figures is not None:
+        line(f"  tool_offset was tried and is not part of the model: {trial.verdict}")
+    tried = [each for each in record["effects_tried"] if each["name"] != "tool_offset"]
+    if tried:
+        names = [f"{each['name']} {place(each['where'])}".strip() for each in tried[:_MOST_TRIED]]
+        more = f" and {len(tried) - _MOST_TRIED} more" if len(tried) > _MOST_TRIED else ""
+        line(f"  tried and not needed, the nearest first: {', '.join(names)}{more}")
+
+
+def _show_unknown(record: Mapping[str, Any]) -> None:
+    unexplained = record["unexplained"]
+    if unexplained["present"]:
+        line(f"  unexplained: {unexplained['text']}")
+        names = [each["column"] for each in unexplained["correlates"]]
+        if names:
+            line(f"  it follows most: {listing(names)}")
+    hidden: Sequence[Mapping[str, Any]] = record["hidden"]
+    if hidden:
+        names = [f"{each['name']} {place(each['where'])}".strip() for each in hidden]
+        line(f"  these spots cannot show: {listing(names)} (the rigid part or the tool swallows them)")
+    for question in record["questions"]:
+        line(f"  not asked: {question['text']}")
+    for text in record["measure_next"]:
+        line(f"  measure next: {text}")
