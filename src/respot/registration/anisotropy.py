@@ -86,9 +86,9 @@ def isotropy_p_value(source: ArrayLike, reference: ArrayLike, *, seed: int = 0) 
     residuals, n = rigid.residuals, len(first)
     if float(np.mean(np.square(residuals))) <= SCALE_FLOOR**2:
         return 1.0
-    observed = float(_sphericity(residuals[None])[0])
     if n > _MANY:
-        return float(stats.chi2.sf(-(n - 2 - 23 / 18) * observed, 5))
+        return rough_isotropy_p_value(residuals)
+    observed = float(_sphericity(residuals[None])[0])
     predicted = rigid.predict(first[order])
     basis = np.linalg.qr(jacobian(predicted - predicted.mean(axis=0)).reshape(-1, 6))[0]
     rng = np.random.default_rng(seed)
@@ -98,6 +98,13 @@ def isotropy_p_value(source: ArrayLike, reference: ArrayLike, *, seed: int = 0) 
         drawn -= (drawn @ basis) @ basis.T
         below += int(np.count_nonzero(_sphericity(drawn.reshape(-1, n, 3)) <= observed))
     return (1 + below) / (1 + DRAWS)
+
+
+def rough_isotropy_p_value(residuals: Array) -> float:
+    """As `isotropy_p_value`, from the residuals (n, 3) of a rigid fit by Bartlett's limit: for few spots rough."""
+    if float(np.mean(np.square(residuals))) <= SCALE_FLOOR**2:
+        return 1.0
+    return float(stats.chi2.sf(-(len(residuals) - 2 - 23 / 18) * float(_sphericity(residuals[None])[0]), 5))
 
 
 def _sphericity(residuals: Array) -> Array:

@@ -28,6 +28,7 @@ Mask = NDArray[np.bool_]
 LEAST_WITNESSES = 6
 """Fewer residuals do not tell the noise of three directions."""
 _CONCENTRATED, _SHARE, _STEPS = 30, 0.75, 20
+_GROWTH = 5  # no more than one in so many comes or goes in a turn: a core of three quarters grows quickly
 _MANY = 1000  # inliers; of more the prediction is certain beside the noise, and one pair does not move it
 
 
@@ -41,7 +42,7 @@ def settle_by_direction(source: Array, reference: Array, inliers: Mask) -> Mask:
         Where to start. Of many the nearest three quarters, by a covariance that is theirs alone: bad spots that lie
         beside each other must not widen the noise that lets them in.
     """
-    return settle(source, reference, _nearest(source, reference, inliers), direction_excess)
+    return settle(source, reference, _nearest(source, reference, inliers), direction_excess, _GROWTH)
 
 
 def _nearest(source: Array, reference: Array, inliers: Mask) -> Mask:

@@ -27,7 +27,7 @@ PARAMETERS = 6
 SCALE_FLOOR = 1e-3  # mm; a finer scale than a micrometre is printing, not noise
 _WITNESSES = 4  # fewer pairs judge nobody
 _TURNS = 60
-_SHARE = 20  # no more than one in twenty comes or goes in one turn, the clearest first
+_SHARE = 20
 
 
 def f_limit(witnesses: int) -> float:
@@ -57,8 +57,13 @@ def settle_inliers(source: Array, reference: Array, inliers: Mask) -> Mask:
     return settle(source, reference, inliers, outlier_excess)
 
 
-def settle(source: Array, reference: Array, inliers: Mask, test: Callable[[Array, Array, Mask], Array]) -> Mask:
-    """As `settle_inliers`, for any test of pairs: `outlier_excess`, or one with its arguments and answer."""
+def settle(
+    source: Array, reference: Array, inliers: Mask, test: Callable[[Array, Array, Mask], Array], share: int = _SHARE
+) -> Mask:
+    """As `settle_inliers`, for any test of pairs: `outlier_excess`, or one with its arguments and answer.
+
+    No more than one in ``share`` comes or goes in one turn, the clearest first.
+    """
     inliers = inliers.copy()
     seen: set[bytes] = set()
     for _ in range(_TURNS):
@@ -70,7 +75,7 @@ def settle(source: Array, reference: Array, inliers: Mask, test: Callable[[Array
             excess = test(source, reference, inliers)
         except RegistrationError:
             break
-        some = max(1, int(inliers.sum()) // _SHARE)
+        some = max(1, int(inliers.sum()) // share)
         passing = np.flatnonzero(~inliers & (excess <= 1.0))
         failing = np.flatnonzero(inliers & (excess > 1.0))
         if len(passing):

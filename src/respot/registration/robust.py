@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
-from respot.registration.anisotropy import SIGNIFICANCE, isotropy_p_value, noise_covariance
+from respot.registration.anisotropy import SIGNIFICANCE, isotropy_p_value, noise_covariance, rough_isotropy_p_value
 from respot.registration.consensus import consensus_transform, quota_of
-from respot.registration.direction_test import direction_limit, settle_by_direction
+from respot.registration.direction_test import LEAST_WITNESSES, direction_limit, settle_by_direction
 from respot.registration.errors import DegenerateError, RegistrationError
 from respot.registration.outlier_test import PARAMETERS, SCALE_FLOOR, f_limit, noise_of, settle_inliers
 from respot.registration.rigid import (
@@ -39,6 +39,7 @@ _TUKEY = 5.5
 _MANY_BAD = 0.6  # the consensus start is taken where its scale is below this share of the other's (large tables)
 _SAMPLE = 20_000  # larger tables find their basin on an even sample of this size
 _TURNS = 30
+_CLEARLY_EVEN = 0.3  # chance of noise that is the same along all axes, beyond which directions are not looked at
 _FULL_TURNS = 6  # over all pairs of a large table; the sample leaves little to do
 
 
@@ -138,6 +139,8 @@ def judged_by_direction(fit: RobustFit, source: Array, reference: Array, *, seed
     """
     step = _step(len(source))
     sample, target, core = source[::step], reference[::step], fit.inliers[::step]
+    if int(core.sum()) <= LEAST_WITNESSES or rough_isotropy_p_value(fit.rigid.residuals[::step][core]) > _CLEARLY_EVEN:
+        return fit
     inliers = settle_by_direction(sample, target, core)
     if np.array_equal(inliers, core) or _alike(sample[inliers], target[inliers], seed):
         return fit
