@@ -151,3 +151,25 @@ def test_exact_and_bad_input():
             call(source[:5], source[:5])
         with pytest.raises(DegenerateError, match="line"):
             call(np.outer(np.arange(9), [1, 2, 3]), source)
+
+
+def test_pairs_that_take_no_part_get_a_residual():
+    rng = np.random.default_rng(9)
+    source, reference = table(rng, 20, UNEVEN)
+    reference[[3, 8]] += [200.0, 0, 50]
+    inliers = ~np.isin(np.arange(20), [3, 8])
+    fit, alone = fit_weighted(source, reference, inliers), fit_weighted(source[inliers], reference[inliers])
+    assert np.array_equal(fit.rotation, alone.rotation)
+    assert np.array_equal(fit.covariance, alone.covariance)
+    assert fit.degrees_of_freedom == 16
+    assert fit.residuals.shape == (20, 3)
+    np.testing.assert_allclose(fit.rigid.predict(source) - reference, fit.residuals, atol=1e-9)
+    np.testing.assert_allclose(fit.centroid, fit.rigid.predict(source[inliers]).mean(axis=0))
+    assert (fit.rigid.rank, fit.rigid.mirrored) == (3, False)
+    np.testing.assert_allclose(
+        fit.half_width[:3], stats.t.ppf(0.975, 16) * np.sqrt(np.diag(fit.covariance)[:3]), rtol=1e-12
+    )
+    with pytest.raises(RegistrationError, match="at least 6"):
+        fit_weighted(source, reference, np.arange(20) < 5)
+    with pytest.raises(RegistrationError, match="inliers are"):
+        fit_weighted(source, reference, inliers[:5])
