@@ -7,9 +7,9 @@ residuals demand (Chen, Wiesel, Eldar and Hero, IEEE Trans. Signal Process. 58 (
 
 When weighing gains: where noise is uneven and a turn moves spots along a quiet direction as well as a noisy one, so
 that the quiet one can tell the turn. With noise of 0.5 / 4.9 / 1.7 mm along x / y / z, as at the rear door, the largest
-error of the transform falls by 16 / 27 / 38 % for 8 / 14 / 60 spots in a box, by 14 to 18 % for spots along a flange; the
-error at new spots by 6 to 25 %. With noise that is the same along all axes nothing is gained and no more than 0.6 %
-lost (`scripts/registration_study.py --only directions`). Its residuals are larger than those of plain least squares,
+error of the transform falls by 16 / 27 / 38 % for 8 / 14 / 60 spots in a box, by 14 to 18 % for a flange;
+the error at new spots by 6 to 25 %. With noise that is the same along all axes nothing is gained and no more than 0.6
+% lost (`scripts/registration_study.py --only directions`). Its residuals are larger than those of plain least squares,
 whose sum of squares is the least there is: it promises a better transform, not a smaller RMS. Of few spots its
 intervals hold a little less often (93 to 95 % at 8).
 """
