@@ -287,7 +287,8 @@ def outside(seeds: range, verbose: bool) -> None:
             totals[name].append((named, one.unexplained or bool(right) or shape))
             if verbose and (named or not totals[name][-1][1]):
                 print(
-                    f"    {dict(one.truth[0]['where'])} {one.truth[0]['left_rms']:.2f} s={one.sigma:.3f} {described(one.claims)}"
+                    f"    {dict(one.truth[0]['where'])} {one.truth[0]['left_rms']:.2f} s={one.sigma:.3f} "
+                    f"{described(one.claims)}"
                 )
         shares = np.mean(totals[name], axis=0)
         print(f"{name:16}{len(some):5}{shares[0]:13.1%}{shares[1]:33.1%}", flush=True)

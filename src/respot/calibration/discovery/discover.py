@@ -337,11 +337,16 @@ def _tool_aliases(search: _Search, found: _Found, index: int) -> tuple[Term, ...
 
 def _named(one: Accepted, left: Unexplained, fit: JointFit, noise: float | None) -> bool:
     """Whether an effect may be called the cause: floor reached, nothing left, rivals lose, all of it determined."""
-    if noise is None or not left.reached or left.present or MECHANISMS[one.term.effect].describes:
+    if noise is None or not left.reached or left.present or not _is_cause(one.term):
         return False
     priors = np.array([parameter.prior for parameter in one.term.parameters])
     plausible = bool(np.all(np.abs(one.values) <= 4.0 * priors))
     return not one.not_separated and plausible and len(fit.residuals) >= LEAST_SPOTS
+
+
+def _is_cause(term: Term) -> bool:
+    mechanism = MECHANISMS[term.effect]
+    return not (mechanism.describes or mechanism.points)
 
 
 def _tried(found: _Found) -> tuple[tuple[Term, float, float], ...]:

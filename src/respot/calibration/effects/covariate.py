@@ -14,8 +14,9 @@ from respot.calibration.observations import Observations
 NAME = "covariate"
 PLAUSIBLE_MM = 5.0
 _SATURATING = (0.08, 0.2, 0.5)
-_PERIODS = tuple(0.5 * halves for halves in range(3, 41))
-"""Waves over the range of a column."""
+_WAVES = tuple(0.5 * halves for halves in range(3, 17))
+_WAVES_IN_TIME = tuple(0.25 * quarters for quarters in range(6, 97))
+"""Waves over the range of a column; what repeats in time (air conditioning, shifts) is told more finely."""
 _LEAST_DISTINCT = 5
 
 
@@ -57,7 +58,7 @@ def _numeric(observations: Observations, name: str, column: Covariate) -> list[T
     waves = tuple(Parameter(f"{wave}_{axis}", "mm", PLAUSIBLE_MM) for wave in ("cos", "sin") for axis in "xyz")
     found += [
         Term(NAME, place, waves, {**own, "shape": "periodic", "waves": count, "frame": "part"}, own=name)
-        for count in _PERIODS
+        for count in (_WAVES_IN_TIME if column.role == "time" else _WAVES)
         if 2.5 * count <= len(distinct)
     ]
     return found
@@ -99,4 +100,5 @@ MECHANISM = Mechanism(
     _remedy,
     needs="a further column",
     separates="the same spots measured at both ends of the column",
+    points=True,
 )

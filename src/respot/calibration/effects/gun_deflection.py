@@ -51,7 +51,7 @@ def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
 
 def _at_full(term: Term, values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Deflection at the highest force, along the tool's axes [mm]."""
-    return values.sum(keepdims=True) if term.form["along"] == "z" else values.reshape(-1, 3).sum(axis=0)
+    return np.asarray(values.reshape(-1, 1 if term.form["along"] == "z" else 3).sum(axis=0))
 
 
 def _remedy(term: Term, values: NDArray[np.float64]) -> Remedy:

@@ -28,21 +28,23 @@ def _terms(observations: Observations) -> list[Term]:
         if half < _LEAST_RANGE / 2.0:
             continue
         place = {"axis": int(axis) + 1}
+        # a constant of the last axis is a tool offset, and no spot tells the two apart
+        least = 1 if axis == observations.robot.axes - 1 else 0
         own = {MIDDLE: float(angles.min()) + half, HALF: half}
         for power in (1, 2, 3, 4, 6):
-            names = tuple(Parameter(f"power_{n}", "deg", PLAUSIBLE_DEG) for n in range(power + 1))
-            found.append(Term(NAME, place, names, {"powers": power, **own}))
+            names = tuple(Parameter(f"power_{n}", "deg", PLAUSIBLE_DEG) for n in range(least, power + 1))
+            found.append(Term(NAME, place, names, {"powers": power, "least": least, **own}))
         if 2.0 * half >= _WIDE:
             for harmonics in (1, 2, 4):
                 names = (
-                    Parameter("power_0", "deg", PLAUSIBLE_DEG),
+                    *(Parameter("power_0", "deg", PLAUSIBLE_DEG) for _ in range(1 - least)),
                     *(
                         Parameter(f"{wave}_{n}", "deg", PLAUSIBLE_DEG)
                         for n in range(1, harmonics + 1)
                         for wave in ("cos", "sin")
                     ),
                 )
-                found.append(Term(NAME, place, names, {"harmonics": harmonics}))
+                found.append(Term(NAME, place, names, {"harmonics": harmonics, "least": least}))
     return found
 
 
@@ -52,11 +54,11 @@ def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
     angles = observations.joints[:, axis]
     if "powers" in term.form:
         even = (angles - term.form[MIDDLE]) / term.form[HALF]
-        values = [even**n for n in range(term.form["powers"] + 1)]
+        values = [even**n for n in range(term.form["least"], term.form["powers"] + 1)]
     else:
         turns = np.radians(angles)
         waves = [wave(n * turns) for n in range(1, term.form["harmonics"] + 1) for wave in (np.cos, np.sin)]
-        values = [np.ones_like(turns), *waves]
+        values = [np.ones_like(turns)] * (1 - term.form["least"]) + waves
     columns = np.zeros((*observations.joints.shape, len(values)))
     columns[:, axis] = np.stack(values, axis=-1)
     return columns
@@ -64,10 +66,11 @@ def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
 
 def _remedy(term: Term, values: NDArray[np.float64]) -> Remedy:
     axis = term.where["axis"]
+    change = np.abs(values[1 - term.form["least"] :]).sum()
     text = (
-        f"The error of axis {axis} changes with its angle, by up to about {np.abs(values[1:]).sum():.3f} degrees over "
-        "the range of these spots. Look at the gear ratio and the counterbalance of this axis (gas pressure, spring); "
-        "if they are in order, correct the points."
+        f"The error of axis {axis} changes with its angle, by up to about "
+        f"{np.abs(values[1 - term.form['least'] :]).sum():.3f} degrees over the range of these spots. Look at the gear "
+        "ratio and the counterbalance of this axis (gas pressure, spring); if they are in order, correct the points."
     )
     return Remedy("robot", text)
 

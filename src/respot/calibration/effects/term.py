@@ -124,7 +124,9 @@ class Mechanism:
     separates : str
         What measurement tells it from what it is confounded with.
     describes : bool
-        It describes a shape and is no cause: it is never named.
+        It describes a shape and is no cause: it comes after all that may be one, and is never named.
+    points : bool
+        It tells where to look for the cause and is none itself: it is never named.
     """
 
     name: str
@@ -135,6 +137,7 @@ class Mechanism:
     needs: str
     separates: str
     describes: bool = False
+    points: bool = False
 
     def shifts(self, observations: Observations, term: Term) -> Array:
         """Shifts of the TCP (n, 3, k) in the source frame per unit of each parameter [mm], to first order."""
