@@ -374,9 +374,10 @@ def _best(placements: list[Placement]) -> list[Placement]:
 
 def _different(one: Placement, two: Placement) -> bool:
     """Less than half of the pairs of either are pairs of both."""
-    pairs = set(zip(one.source_rows.tolist(), one.reference_rows.tolist(), strict=True))
-    shared = len(pairs & set(zip(two.source_rows.tolist(), two.reference_rows.tolist(), strict=True)))
-    return 2 * shared < max(len(pairs), len(two.source_rows))
+    partner = np.full(1 + max(one.source_rows.max(initial=0), two.source_rows.max(initial=0)), -1, dtype=np.intp)
+    partner[one.source_rows] = one.reference_rows
+    shared = int(np.count_nonzero(partner[two.source_rows] == two.reference_rows))
+    return 2 * shared < max(len(one.source_rows), len(two.source_rows))
 
 
 def _decide(
