@@ -183,7 +183,7 @@ def test_a_tool_offset_is_part_of_the_prediction_and_of_its_ball(points):
         # the turn is a hundredth of a degree: offsets along the tools before and after it are the same
         model = Calibration(seen, step[:3], "measured", "free", tool_offset=step[6:])
         calibrated = model.predict(spots, Rotation.from_matrix(tools))[0]
-        sure = precision_of(spots, calibrated, calibrated - measured, Rotation.from_matrix(seen @ tools))
+        sure = precision_of(spots, calibrated, calibrated - measured, seen @ tools)
         found = predict_spots(replace(model, precision=sure), ["p"], where, tool)
         held += np.linalg.norm(found.positions[0] - truth) <= found.ci95[0]
     assert held / 500 == pytest.approx(0.955, abs=0.03)

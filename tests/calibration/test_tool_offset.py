@@ -98,7 +98,7 @@ def test_a_known_offset_is_found_with_its_remedy():
     assert effect["name"] == "tool_offset"
     assert effect["where"] == {"frame": "tool"}
     assert effect["remedy"]["where"] == "tool"
-    assert effect["p_value"] == pytest.approx(0.001)
+    assert effect["p_value"] <= 0.001
     for name, true in zip("xyz", OFFSET, strict=True):
         low, high = effect["parameters"][name]["ci95"]
         assert effect["parameters"][name]["unit"] == "mm"

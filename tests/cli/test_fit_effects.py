@@ -73,7 +73,7 @@ def test_a_gun_that_never_turns(respot, tables):
 def test_an_unknown_effect(respot, tables):
     result = respot("fit", "poses.csv", "--measured", "tracker.csv", "--effects", "tool-offset")
     assert result.code == 2
-    assert "swapped_ids, tool_offset" in result.err
+    assert "there are swapped_ids, convention, tool_offset, scale" in result.err
 
 
 def test_the_rear_door_has_no_tool_offset(respot, backup, theory):

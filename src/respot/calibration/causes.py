@@ -11,8 +11,11 @@ from scipy.spatial.transform import Rotation
 
 from respot.calibration.discovery.discover import LEAST_SPOTS, Discovery, discover
 from respot.calibration.discovery.records import effects_of
-from respot.calibration.effects import EFFECTS, swapped_ids, tool_offset
+from respot.calibration.effects import EFFECTS, convention, swapped_ids, tool_offset
 from respot.calibration.effects.catalogue import MECHANISMS
+from respot.calibration.effects.convention import ConventionTrial, investigate_convention
+from respot.calibration.effects.convention_tool import investigate_by_tool
+from respot.calibration.effects.readings import Columns, reread
 from respot.calibration.effects.search import Effects, search_effects
 from respot.calibration.effects.tool_offset import ToolTrial
 from respot.calibration.observations import Observations
@@ -24,6 +27,14 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 Observe = Callable[[Rows], Observations]
 """Observations of the pairs, for a permutation (n,) of the reference's rows: names that are exchanged back."""
+
+
+@dataclass(frozen=True)
+class Written:
+    """How lists write orientations: ``"abc"`` or ``"quaternion"``; None for a program, whose language says so."""
+
+    source: Columns | None = None
+    reference: Columns | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,12 +52,18 @@ class Causes:
         All other effects, where they were looked for.
     observations : Observations or None
         What discovery saw.
+    rotations : Rotation of n, or None
+        Tool orientations of the source, read as a named convention has it.
+    convention : ConventionTrial or None
+        Whether a list writes its orientations in another way, where that was asked.
     """
 
     exchanged: ExchangeResult
     trial: ToolTrial | None
     discovery: Discovery | None = None
     observations: Observations | None = None
+    rotations: Rotation | None = None
+    convention: ConventionTrial | None = None
 
     @property
     def in_model(self) -> Discovery | None:
@@ -87,6 +104,8 @@ def find_causes(
     kind: str,
     noise: float | None,
     seed: int,
+    reference_rotations: Rotation | None = None,
+    written: Written | None = None,
     nested: bool = True,
     progress: Callable[[], None] = lambda: None,
 ) -> Causes:
@@ -99,6 +118,10 @@ def find_causes(
     effects : "auto" or names
     observe : callable, optional
         What else is known of the pairs; default their poses alone.
+    reference_rotations : Rotation of n, optional
+        Tool orientations of the reference, by the names as given.
+    written : Written, optional
+        How both lists write orientations; default as programs.
     nested : bool
         As `respot.calibration.discovery.discover.discover`.
     progress : callable
@@ -109,15 +132,26 @@ def find_causes(
     RegistrationError
         As `names_of` and `search_effects`.
     """
-    looked_for = names_of(effects)
+    looked_for, written = names_of(effects), written or Written()
     simple: Effects = "auto" if effects == "auto" else tuple(name for name in looked_for if name in EFFECTS)
     exchanged, trial = search_effects(ids, source, reference, rotations, simple, kind=kind, noise=noise, seed=seed)
+    reading = None
+    if convention.NAME in looked_for and rotations is not None:
+        reading = _reading(source, reference, rotations, reference_rotations, exchanged, written, kind, seed)
+        found_reading = None if reading is None else reading.finding
+        if found_reading is not None and found_reading.side == "source" and found_reading.effect.named:
+            rotations = reread(rotations, found_reading.reading)
+            exchanged, trial = search_effects(
+                ids, source, reference, rotations, simple, kind=kind, noise=noise, seed=seed
+            )
     others = frozenset(name for name in looked_for if name in MECHANISMS)
     if others <= {tool_offset.NAME} or len(ids) < LEAST_SPOTS:
-        return Causes(exchanged, trial)
+        return Causes(exchanged, trial, rotations=rotations, convention=reading)
 
     def look(names: ExchangeResult) -> tuple[Discovery, Observations]:
-        seen = Observations(source, rotations) if observe is None else observe(names.permutation)
+        seen = Observations(source, rotations)
+        if observe is not None:
+            seen = replace(observe(names.permutation), rotations=rotations)
         repaired = reference[names.permutation]
         start = names.robust.inliers
         found = discover(
@@ -138,7 +172,36 @@ def find_causes(
         if not np.array_equal(again.permutation, exchanged.permutation):
             exchanged = again
             found, seen = look(exchanged)
-    return Causes(*_settled(ids, source, reference, exchanged, trial, found, looked_for, seed), found, seen)
+    settled = _settled(ids, source, reference, exchanged, trial, found, looked_for, seed)
+    return Causes(*settled, found, seen, rotations, reading)
+
+
+def _reading(
+    source: Array,
+    reference: Array,
+    rotations: Rotation,
+    reference_rotations: Rotation | None,
+    exchanged: ExchangeResult,
+    written: Written,
+    kind: str,
+    seed: int,
+) -> ConventionTrial | None:
+    """Whether a list writes its orientations in another way; None where neither list can tell."""
+    rows = np.flatnonzero(exchanged.robust.inliers)
+    if reference_rotations is None:
+        if written.source is None:  # programs are read by their language: there is no other way
+            return None
+        repaired = reference[exchanged.permutation]
+        return investigate_by_tool(source, rotations, repaired, seed=seed, kind=kind, columns=written.source)
+    return investigate_convention(
+        rotations[rows],
+        reference_rotations[exchanged.permutation][rows],
+        registration=exchanged.robust.rigid.rotation if exchanged.robust.rigid.rank > 1 else None,
+        kind=kind,
+        source_columns=written.source or "abc",
+        reference_columns=written.reference or "abc",
+        sides=("reference",) if written.source is None else ("source", "reference"),
+    )
 
 
 def _settled(

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from respot.calibration import effects_model
 from respot.calibration.calibration import Calibration, Frame, Kind
-from respot.calibration.causes import Causes, Observe, find_causes, names_of
+from respot.calibration.causes import Causes, Observe, Written, find_causes, names_of
 from respot.calibration.discovery.records import effects_of as discovered_effects
 from respot.calibration.effects import swapped_ids, tool_model, tool_offset
 from respot.calibration.effects.orientations import OrientationFit, compare_orientations
@@ -29,7 +29,6 @@ from respot.registration.alternatives import fit_translation
 from respot.registration.anisotropy import isotropy_p_value
 from respot.registration.congruence import congruence
 from respot.registration.errors import DegenerateError, RegistrationError
-from respot.registration.exchanged import ExchangeResult
 from respot.registration.leave_one_out import leave_one_out
 from respot.registration.matching import IdMatch, Matching, match_by_name
 from respot.registration.pairing import Note, Pairing, pair_spots
@@ -68,6 +67,7 @@ def fit_tables(
     matching: Matching = "auto",
     effects: Effects = RIGID_ONLY,
     provenance: Mapping[str, Any] | None = None,
+    written: Written | None = None,
     observe: PairedObserve | None = None,
     nested: bool = True,
     progress: Callable[[], None] = lambda: None,
@@ -83,6 +83,8 @@ def fit_tables(
     matching : "auto", "id" or "geometry"
         How spots are paired; see `respot.registration.pairing.pair_spots`. Where names and distances disagree and the
         effect ``tool_offset`` is looked for, pairs by name are taken if an offset makes the two lists congruent.
+    written : Written, optional
+        How both lists write orientations; default as programs do.
     observe : callable, optional
         From rows of source and reference to `respot.calibration.observations.Observations` of the pairs.
 
@@ -141,6 +143,7 @@ def fit_tables(
         provenance=provenance,
         match=match,
         notes=notes,
+        written=written,
         observe=None
         if observe is None
         else lambda permutation: observe(match.source_rows, match.reference_rows[permutation]),
@@ -192,6 +195,7 @@ def fit_spots(
     provenance: Mapping[str, Any] | None = None,
     match: IdMatch | None = None,
     notes: tuple[Note, ...] = (),
+    written: Written | None = None,
     observe: Observe | None = None,
     nested: bool = True,
     progress: Callable[[], None] = lambda: None,
@@ -231,6 +235,8 @@ def fit_spots(
         Where the pairs come from, for the counts and the reference's own names.
     notes : tuple of Note
         What was noticed while pairing.
+    written : Written, optional
+        How both lists write orientations; default as programs do.
     observe : callable, optional
         What else is known of the pairs: `respot.calibration.causes.Observe`.
     nested : bool
@@ -259,15 +265,20 @@ def fit_spots(
         kind=kind,
         noise=noise,
         seed=seed,
+        reference_rotations=reference_rotations,
+        written=written,
         nested=nested,
         progress=progress,
     )
     repaired = second[causes.exchanged.permutation]
-    model = _model_of(causes, first, repaired, source_rotations, seed)
+    model = _model_of(causes, first, repaired, seed)
     robust, moved, inliers = model.robust, model.moved, model.robust.inliers
     _require_breadth(robust.rigid, model.uncertainty.sigma)
     exchanged, trial = causes.exchanged, causes.trial
     found = swapped_ids.effects_of(exchanged, names, second, kind=kind)
+    reading = causes.convention
+    if reading is not None and reading.finding is not None:
+        found = (*found, reading.finding.effect)
     if trial is not None and trial.effect is not None:
         found = (*found, trial.effect)
     if causes.in_model is not None:
@@ -280,7 +291,7 @@ def fit_spots(
         reference_ids=tuple(reference_names[row] for row in exchanged.permutation),
         source=first,
         reference=repaired,
-        source_rotations=source_rotations,
+        source_rotations=causes.rotations,
         as_found=first - second,
         before=fit_rigid(first, second, checked=False),
         before_loo=leave_one_out(first, second),
@@ -296,7 +307,8 @@ def fit_spots(
         noise=noise,
         notes=notes if not model.has_tool else tuple(note for note in notes if note.code != "NOT_CONGRUENT"),
         tool=trial,
-        orientations=_orientations(robust, model.rotations, reference_rotations, exchanged),
+        orientations=_orientations(robust, source_rotations, reference_rotations, causes, written, kind),
+        convention=reading,
         discovery=causes.discovery,
         observations=causes.observations,
         noise_source=noise_source if noise is not None else None,
@@ -319,7 +331,8 @@ class _Model:
     has_tool: bool
 
 
-def _model_of(causes: Causes, source: Array, repaired: Array, rotations: Rotation | None, seed: int) -> _Model:
+def _model_of(causes: Causes, source: Array, repaired: Array, seed: int) -> _Model:
+    rotations = causes.rotations
     trial, joint = causes.trial, causes.in_model
     if joint is not None:
         robust = effects_model.robust_of(joint.fit, repaired)
@@ -367,12 +380,25 @@ def _calibration_of(
 
 
 def _orientations(
-    robust: RobustFit, source: Rotation | None, reference: Rotation | None, exchanged: ExchangeResult
+    robust: RobustFit,
+    source: Rotation | None,
+    reference: Rotation | None,
+    causes: Causes,
+    written: Written | None,
+    kind: Kind,
 ) -> OrientationFit | None:
     if source is None or reference is None:
         return None
     rows = np.flatnonzero(robust.inliers)
-    return compare_orientations(robust.rigid.rotation, source[rows], reference[exchanged.permutation[rows]])
+    return compare_orientations(
+        robust.rigid.rotation,
+        source[rows],
+        reference[causes.exchanged.permutation[rows]],
+        kind=kind,
+        source_columns=(written.source if written else None) or "abc",
+        reference_columns=(written.reference if written else None) or "abc",
+        finding=None if causes.convention is None else causes.convention.finding,
+    )
 
 
 def _check(names: tuple[str, ...], source: ArrayLike, reference: ArrayLike) -> tuple[Array, Array]:

@@ -105,6 +105,8 @@ def _search(fit: SpotFit) -> dict[str, Any]:
     """What was tried and lost, what is hidden, what could not be asked, what to measure next."""
     found = fit.discovery
     tried = [] if fit.tool is None else [fit.tool.to_dict()]
+    if fit.convention is not None:
+        tried.append(fit.convention.to_dict())
     if found is None:
         asked = questions_of(None, len(fit.ids), None) if fit.kind_of_search == "all" else []
         return {"effects_tried": tried, "hidden": [], "questions": asked, "measure_next": []}

@@ -10,7 +10,9 @@ import numpy as np
 
 from respot import __version__
 from respot.calibration.calibration import Frame, Kind
+from respot.calibration.causes import Written
 from respot.calibration.effects import tool_offset
+from respot.calibration.effects.readings import Columns
 from respot.calibration.effects.search import RIGID_ONLY, Effects
 from respot.calibration.effects.tool_fit import moved_by
 from respot.calibration.fit import fit_tables
@@ -137,6 +139,7 @@ def fit_source(source_path: Path, reference_path: Path, options: FitOptions) -> 
             n_min=options.n_min,
             matching=options.match,
             effects=options.effects,
+            written=Written(_columns_of(source), _columns_of(reference)),
             observe=observations.of,
             progress=options.progress,
             provenance={
@@ -154,6 +157,13 @@ def fit_source(source_path: Path, reference_path: Path, options: FitOptions) -> 
     if fit.discovery is not None:
         issues += [*observations.issues, *_effect_issues(fit, source)]
     return SourceFit(source, reference, fit, issues)
+
+
+def _columns_of(source: Source) -> Columns | None:
+    """How a list writes orientations; None for a program."""
+    if source.table is None:
+        return None
+    return "quaternion" if "q1" in source.table.columns else "abc"
 
 
 def _source_of(path: Path, reference: Source, options: FitOptions) -> Source:

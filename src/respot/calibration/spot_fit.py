@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from respot.calibration.calibration import Calibration, CalibrationError
 from respot.calibration.discovery.discover import Discovery
+from respot.calibration.effects.convention import ConventionTrial
 from respot.calibration.effects.effect import Effect
 from respot.calibration.effects.orientations import OrientationFit
 from respot.calibration.effects.tool_offset import ToolTrial
@@ -87,6 +88,8 @@ class SpotFit:
         fit of `moved`, and ``uncertainty.covariance`` has their parameters last.
     observations : Observations or None
         What it saw.
+    convention : ConventionTrial or None
+        Whether a list writes its orientations in another way, where that was asked.
     noise_source : str or None
         Where ``noise`` is known from: ``"--noise"`` or ``"repeats"``.
     kind_of_search : "all" or "some"
@@ -122,6 +125,7 @@ class SpotFit:
     orientations: OrientationFit | None = None
     discovery: Discovery | None = None
     observations: Observations | None = None
+    convention: ConventionTrial | None = None
     noise_source: str | None = None
     kind_of_search: Literal["all", "some"] = "some"
 

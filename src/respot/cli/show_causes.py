@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 _MOST_PARAMETERS = 9
 _MOST_TRIED = 6
+_SHOWN_ELSEWHERE = ("swapped_ids", "convention", "tool_offset")
 
 
 def show_causes(fit: SpotFit, record: Mapping[str, Any]) -> None:
@@ -29,8 +30,10 @@ def show_causes(fit: SpotFit, record: Mapping[str, Any]) -> None:
     effects = record["effects"]
     for effect in effects:
         word = "named" if effect["named"] else "consistent with"
-        line(f"  {effect['name']} {place(effect['where'])} ({word}): {effect['remedy']['text']}")
-        if effect["name"] not in ("swapped_ids", "tool_offset", "convention"):
+        judged_before = effect["name"] in _SHOWN_ELSEWHERE
+        where = "" if judged_before else f" {place(effect['where'])}".rstrip()
+        line(f"  {effect['name']}{where} ({word}): {effect['remedy']['text']}")
+        if not judged_before:
             _show_evidence(effect)
     if not effects:
         line("  no effect found beyond the rigid transform")

@@ -69,7 +69,7 @@ def _remedy(term: Term, values: NDArray[np.float64]) -> Remedy:
     change = np.abs(values[1 - term.form["least"] :]).sum()
     text = (
         f"The error of axis {axis} changes with its angle, by up to about "
-        f"{np.abs(values[1 - term.form['least'] :]).sum():.3f} degrees over the range of these spots. Look at the gear "
+        f"{change:.3f} degrees over the range of these spots. Look at the gear "
         "ratio and the counterbalance of this axis (gas pressure, spring); if they are in order, correct the points."
     )
     return Remedy("robot", text)
