@@ -31,6 +31,7 @@ from typing import Any
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: one thread for each of our processes
 
 import numpy as np
+from scipy.spatial.transform import RigidTransform
 
 from respot.calibration.covariates import covariates_of
 from respot.calibration.discovery.discover import Discovery, discover
@@ -75,12 +76,16 @@ def observations_of(line: Line) -> Observations:
         name: np.asarray(values, dtype=np.float64) for name, values in line.columns.items() if values.dtype != object
     }
     external = line.external_axes
+    # a rail carries the robot along the world's y
+    travel = np.zeros(line.n) if external is None else external[:, 0]
+    foot = RigidTransform.from_translation(travel[:, None] * np.array([0.0, 1.0, 0.0]))
     return Observations(
         line.positions,
         line.rotations,
         line.joints,
         line.measured_joints,
         find_robot(str(line.robot["name"])),
+        base2source=foot,
         external_axes=external if external is not None and np.isfinite(external).any() else None,
         columns=covariates_of(texts, numbers, ())[0],
     )
@@ -176,9 +181,8 @@ def _names() -> list[str]:
 def _table(title: str, trials: Mapping[str, list[Trial]], verbose: bool) -> None:
     print(f"\n{title}")
     print(f"{'effect':16}{'n':>5}{'named':>8}{'found':>8}{'first':>8}{'among 5':>9}{'wrong':>8}{'wrong named':>13}")
-    every: list[Trial] = []
-    for name, some in [*trials.items(), ("all", [one for some in trials.values() for one in some])]:
-        every = some
+    every = [one for each_kind in trials.values() for one in each_kind]
+    for name, some in [*trials.items(), ("all", every)]:
         rows = [
             [
                 any(c.named and same(one.truth[0], c.name, c.where) for c in one.claims),

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform
 
-from respot.correction.chain import Chain, chain_of
 from respot.kinematics.cell import Reason, RobotCell
+from respot.kinematics.motion_chain import Chain, chain_of
 from respot.kinematics.robots import find_robot
 from respot.kinematics.track import Track
 from respot.program.frames import Frame

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import RigidTransform
 
 from respot.calibration.covariates import covariates_of
 from respot.calibration.discovery.discover import Discovery, discover
@@ -33,12 +34,15 @@ class Seen:
 def observations_of(line: Line) -> Observations:
     texts = {name: [str(value) for value in values] for name, values in line.columns.items()}
     numbers = {name: np.asarray(v, dtype=float) for name, v in line.columns.items() if v.dtype != object}
+    travel = np.zeros(line.n) if line.external_axes is None else line.external_axes[:, 0]
+    foot = RigidTransform.from_translation(travel[:, None] * np.array([0.0, 1.0, 0.0]))  # the rail runs along y
     return Observations(
         line.positions,
         line.rotations,
         line.joints,
         line.measured_joints,
         find_robot(str(line.robot["name"])),
+        base2source=foot,
         external_axes=line.external_axes,
         columns=covariates_of(texts, numbers, ())[0],
     )

@@ -58,6 +58,25 @@ def columns_of(observations: Observations, terms: Sequence[Term]) -> Array:
     return np.concatenate([np.empty((len(observations), 3, 0)), *blocks], axis=2)
 
 
+@dataclass(frozen=True, eq=False)
+class Span:
+    """Independent directions of some terms.
+
+    Attributes
+    ----------
+    chosen : tuple of int
+        The terms, in their order.
+    seen : (a, all columns) array
+        Products of the orthonormal directions with all columns.
+    coefficients : (a, parameters) array
+        Each direction as a combination of the terms' columns.
+    """
+
+    chosen: tuple[int, ...]
+    seen: Array
+    coefficients: Array
+
+
 class Bank:
     """Columns of terms over some spots, the rigid part projected out.
 
@@ -74,6 +93,8 @@ class Bank:
         self.spots = len(points)
         self.terms = tuple(terms)
         sizes = np.array([len(term.parameters) for term in self.terms], dtype=np.intp)
+        #: directions that a term uses at most, those first in which its prior moves the spots most
+        self.leading = np.array([term.form.get("leading", len(term.parameters)) for term in self.terms], dtype=np.intp)
         stops = np.cumsum(sizes)
         self.slices = [slice(int(stop - size), int(stop)) for size, stop in zip(sizes, stops, strict=True)]
         columns = np.ascontiguousarray(columns.reshape(3 * self.spots, -1))
@@ -85,6 +106,7 @@ class Bank:
         for _ in range(2):  # products lose half of the digits
             columns = columns - self.rigid @ (self.rigid.T @ columns)
         self.columns = columns
+        self._products: dict[int, Array] = {}
         #: indices of terms by number of parameters, and of their columns
         self.groups = {int(size): np.flatnonzero(sizes == size) for size in np.unique(sizes)}
         self.places = {
@@ -130,28 +152,70 @@ class Bank:
         result: Array = vectors - self.rigid @ (self.rigid.T @ vectors)
         return result
 
-    def gains(self, basis: Array, left: Array, sigma: float) -> Gains:
-        """What each term explains of ``left`` beside ``basis``.
+    def products(self, index: int) -> Array:
+        """Products (k, all columns) of a term's columns with all others; kept, since a search asks again and again."""
+        found = self._products.get(index)
+        if found is None:
+            found = self._products[index] = self.columns[:, self.slices[index]].T @ self.columns
+        return found
+
+    def span(self, chosen: Sequence[int], sigma: float) -> Span:
+        """Independent directions of some terms, in their order.
+
+        A term's directions are those in which it moves the spots, beside the terms before it, by more than noise when
+        it is as large as its prior.
 
         Parameters
         ----------
-        basis : (3m, a) array
-            Orthonormal, without rigid part: the terms in the model.
-        left : (3m,) array
-            Residual of that model [mm].
+        chosen : sequence of int
+        sigma : float
+            Noise per coordinate [mm].
+        """
+        seen = np.zeros((0, self.columns.shape[1]))
+        coefficients = np.zeros((0, 0))
+        for index in chosen:
+            part = self.slices[index]
+            own = self.products(index)
+            beside = seen[:, part]
+            gram = own[:, part] - beside.T @ beside
+            raw = np.array([self.raw[part].sum()])
+            whitener = self._whiten(gram[None], raw, sigma, self.leading[[index]], _EIGEN_FLOOR)[0][0]
+            rows = whitener[np.any(whitener != 0.0, axis=1)]
+            # the term's own columns, less what the directions before it have of them
+            share = rows @ beside.T
+            added = np.hstack([-share @ coefficients, rows])
+            above = np.hstack([coefficients, np.zeros((len(coefficients), rows.shape[1]))])
+            coefficients = np.vstack([above, added])
+            seen = np.vstack([seen, rows @ own - share @ seen])
+        return Span(tuple(chosen), seen, coefficients)
+
+    def basis(self, span: Span) -> Array:
+        """Orthonormal basis (3m, a) of a span."""
+        if not span.chosen:
+            return np.zeros((3 * self.spots, 0))
+        part = np.hstack([self.columns[:, self.slices[index]] for index in span.chosen])
+        return np.asarray(part @ span.coefficients.T)
+
+    def gains(self, span: Span, products: Array, sigma: float) -> Gains:
+        """What each term explains of a residual beside a span.
+
+        Parameters
+        ----------
+        span : Span
+            The terms in the model.
+        products : (all columns,) array
+            Products of the columns with the model's residual [mm].
         sigma : float
             Noise per coordinate [mm]: directions whose plausible size stays below it are not determined.
         """
-        seen = basis.T @ self.columns
-        products = self.columns.T @ left
         squares, ranks = np.zeros(len(self.terms)), np.zeros(len(self.terms), dtype=np.intp)
         sizes = np.zeros(len(self.terms))
         whiteners = {}
         for size, members in self.groups.items():
             places = self.places[size]
-            part = seen[:, places]  # a, terms, k
+            part = span.seen[:, places]  # a, terms, k
             gram = self.grams[size] - np.einsum("atk,atl->tkl", part, part)
-            whitener, kept = self._whiten(gram, self.raw[places].sum(axis=1), sigma)
+            whitener, kept = self._whiten(gram, self.raw[places].sum(axis=1), sigma, self.leading[members])
             shares = np.einsum("tkl,tl->tk", whitener, products[places])
             sizes[members] = np.sum((shares * np.linalg.norm(whitener, axis=2)) ** 2, axis=1)
             squares[members], ranks[members] = np.sum(shares**2, axis=1), kept
@@ -159,36 +223,11 @@ class Bank:
         return Gains(squares, ranks, sizes, whiteners)
 
     @staticmethod
-    def _whiten(gram: Array, raw: Array, sigma: float) -> tuple[Array, Rows]:
+    def _whiten(gram: Array, raw: Array, sigma: float, leading: Rows, least: float = 0.0) -> tuple[Array, Rows]:
         values, vectors = np.linalg.eigh(gram)
-        floor = np.maximum(sigma**2, ABSORBED**2 * raw / gram.shape[1])[:, None]
-        known = values > floor
+        size = gram.shape[1]
+        floor = np.maximum(np.maximum(sigma**2, least), ABSORBED**2 * raw / size)[:, None]
+        known = (values > floor) & (np.arange(size) >= size - leading[:, None])
         factor = np.where(known, 1.0 / np.sqrt(np.where(known, values, 1.0)), 0.0)
         whitener = factor[:, :, None] * np.swapaxes(vectors, 1, 2)
         return whitener, known.sum(axis=1).astype(np.intp)
-
-    def directions(self, index: int, basis: Array, sigma: float) -> Array:
-        """Orthonormal directions (3m, r) that a term adds to ``basis`` (3m, a)."""
-        part = self.columns[:, self.slices[index]]
-        raw = float(self.raw[self.slices[index]].sum())
-        for _ in range(2):
-            part = part - basis @ (basis.T @ part)
-        values, vectors = np.linalg.eigh(part.T @ part)
-        known = values > max(sigma**2, ABSORBED**2 * raw / part.shape[1], _EIGEN_FLOOR)
-        found = part @ (vectors[:, known] / np.sqrt(values[known]))
-        return np.asarray(found - basis @ (basis.T @ found))
-
-    def size_of(self, chosen: Sequence[int], wanted: Array, sigma: float) -> float:
-        """Sum of squares of the parameters of a model of some terms, in units of their priors."""
-        if not chosen:
-            return 0.0
-        part = np.hstack([self.columns[:, self.slices[index]] for index in chosen])
-        answer = np.linalg.solve(part.T @ part + max(sigma**2, _EIGEN_FLOOR) * np.eye(part.shape[1]), part.T @ wanted)
-        return float(answer @ answer)
-
-    def basis_of(self, chosen: Sequence[int], sigma: float) -> Array:
-        """Orthonormal basis (3m, a) of the chosen terms, in their order."""
-        basis = np.zeros((3 * self.spots, 0))
-        for index in chosen:
-            basis = np.hstack([basis, self.directions(index, basis, sigma)])
-        return basis

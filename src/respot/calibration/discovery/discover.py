@@ -199,7 +199,7 @@ def _prepared(
     columns = columns_of(observations, terms)
     bank = Bank(terms, columns, observations.positions)
     # directions that even the widest plausible error hides behind rounding
-    whole = bank.gains(np.zeros((3 * len(observations), 0)), np.zeros(3 * len(observations)), 0.0)
+    whole = bank.gains(bank.span((), 0.0), np.zeros(columns.shape[2]), 0.0)
     aliases = _aliases_of_tool(terms, columns)
     allowed = whole.ranks > 0
     allowed[list(aliases)] = False
@@ -240,7 +240,7 @@ def _settle(search: _Search, inliers: Mask, draws: int) -> _Found:
         state = selection.search() if len(rows) >= LEAST_SPOTS else selection.state((), 0.0)
         chosen = tuple(sorted(state.chosen))
         fit = fit_jointly(search.observations, search.reference, [search.terms[i] for i in chosen], inliers)
-        found = _Found(selection, replace(state, chosen=chosen), fit)
+        found = _Found(selection, selection.state(chosen, selection.sigma(state)), fit)
         inliers = settled(fit)
         key = (np.packbits(inliers).tobytes(), chosen)
         if key in seen:
@@ -341,7 +341,7 @@ def _named(one: Accepted, left: Unexplained, fit: JointFit, noise: float | None)
         return False
     priors = np.array([parameter.prior for parameter in one.term.parameters])
     plausible = bool(np.all(np.abs(one.values) <= 4.0 * priors))
-    return not one.not_separated and plausible and len(fit.residuals) >= LEAST_SPOTS
+    return not one.aliases and one.table.all_lose_clearly and plausible and len(fit.residuals) >= LEAST_SPOTS
 
 
 def _is_cause(term: Term) -> bool:

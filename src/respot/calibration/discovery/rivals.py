@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from respot.calibration.discovery.bank import Bank, Span
 from respot.calibration.discovery.heldout import HeldOut, heldout
 from respot.calibration.discovery.joint_fit import JointFit, fit_jointly
 from respot.calibration.discovery.selection import Selection, State
@@ -16,8 +17,10 @@ from respot.calibration.observations import Observations
 
 Array = NDArray[np.float64]
 
+SEPARATED = 6.0
+"""A rival is separated when its criterion is larger by this: odds of 20 to 1, were both as likely before."""
 CLEAR = 10.0
-"""A rival loses clearly when its criterion is larger by this: odds of 150 to 1, were both as likely before."""
+"""It loses clearly, so that the cause may be named, when it is larger by this: 150 to 1."""
 _SHOWN = 6
 _CONTAINED = 1e-3
 
@@ -30,7 +33,7 @@ class RivalTable:
     ----------
     term : Term
     rivals : tuple of (Term, HeldOut, float, bool)
-        The best others: term, held-out errors, by how much the criterion is larger, and whether it clearly loses.
+        The best others: term, held-out errors, by how much the criterion is larger, and whether they are separated.
     without : HeldOut
         Held-out errors of the model without the term.
     """
@@ -41,8 +44,13 @@ class RivalTable:
 
     @property
     def not_separated(self) -> tuple[Term, ...]:
-        """Rivals that do not clearly lose."""
+        """Rivals that the spots do not tell from it."""
         return tuple(term for term, _, _, loses in self.rivals if not loses)
+
+    @property
+    def all_lose_clearly(self) -> bool:
+        """Whether every rival does."""
+        return all(apart > CLEAR for _, _, apart, _ in self.rivals)
 
 
 def rival_table(
@@ -72,13 +80,14 @@ def rival_table(
     bank = selection.bank
     sigma = selection.sigma(state)
     rest = selection.state([i for i in state.chosen if i != index], sigma)
-    criteria = selection.beside(rest)
+    # what an explanation costs for being no cause decides which is taken, not how far the data speak against another
+    criteria = selection.beside(rest) - selection.handicap
     own = bank.terms[index]
-    own_directions = bank.directions(index, rest.basis, sigma)
+    own_rows = bank.span([*rest.chosen, index], sigma)
     # of the same finding the form does not matter
     seen = {own.key}
     found: list[tuple[Term, HeldOut, float, bool]] = []
-    base = float(min(state.criterion, criteria[index]))
+    base = float(min(state.criterion - selection.handicap[index], criteria[index]))
     for other in np.argsort(criteria).tolist():
         if not np.isfinite(criteria[other]) or len(found) == _SHOWN:
             break
@@ -87,18 +96,20 @@ def rival_table(
             continue
         seen.add(term.key)
         apart = float(criteria[other] - base)
-        if _holds(bank.directions(other, rest.basis, sigma), own_directions):
+        if _holds(bank, bank.span([*rest.chosen, other], sigma), own_rows, rest.rank):
             continue
         others = [bank.terms[i] for i in rest.chosen] + [term]
         trial = fit_jointly(observations, reference, others, fit.inliers)
-        found.append((term, heldout(trial, folds, skip), apart, apart > CLEAR))
+        found.append((term, heldout(trial, folds, skip), apart, apart > SEPARATED))
     bare = fit_jointly(observations, reference, [bank.terms[i] for i in rest.chosen], fit.inliers)
     return RivalTable(own, tuple(found), heldout(bare, folds, skip))
 
 
-def _holds(directions: Array, contained: Array) -> bool:
-    """Whether the span of ``directions`` (3m, r) holds all of ``contained`` (3m, s) and is larger."""
-    if directions.shape[1] <= contained.shape[1] or not contained.shape[1]:
+def _holds(bank: Bank, span: Span, contained: Span, start: int) -> bool:
+    """Whether one span holds all of another's directions beyond the ``start`` they share, and is larger."""
+    wide, narrow = len(span.seen) - start, len(contained.seen) - start
+    if wide <= narrow or not narrow:
         return False
-    left = contained - directions @ (directions.T @ contained)
-    return bool(np.linalg.norm(left) < _CONTAINED * np.sqrt(contained.shape[1]))
+    directions, inner = bank.basis(span)[:, start:], bank.basis(contained)[:, start:]
+    left = inner - directions @ (directions.T @ inner)
+    return bool(np.linalg.norm(left) < _CONTAINED * np.sqrt(narrow))

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from respot.calibration.discovery.bank import Bank
-from respot.calibration.discovery.significance import ALPHA, largest_by_chance, p_value, scores
+from respot.calibration.discovery.bank import Bank, Gains, Span
+from respot.calibration.discovery.significance import ALPHA, largest_by_chance, normal_score, p_value
 from respot.calibration.effects.catalogue import MECHANISMS
 
 Array = NDArray[np.float64]
@@ -19,6 +20,8 @@ Mask = NDArray[np.bool_]
 MOST_EFFECTS = 6
 _LAST = 10.0
 """A term that only describes must be better by this much (as `Selection.criterion`) than one that may be a cause."""
+_POINTS = 8.0
+"""The same for a term that only tells where to look: a covariate."""
 _EACH = 4.0
 """What each effect costs beside its parameters: one cause before two."""
 _BETTER = 0.5
@@ -38,23 +41,36 @@ class State:
 
     Attributes
     ----------
-    chosen : tuple of int
-        Indices in the bank.
-    basis : (3m, a) array
-        Orthonormal directions of its terms.
-    left : (3m,) array
-        Residual [mm].
+    span : Span
+        Its terms' directions.
+    shares : (a,) array
+        What is wanted along each [mm].
+    products : (all columns,) array
+        Products of all columns with the residual.
+    square_sum : float
+        Of the residual [mm^2].
     criterion : float
         Smaller is better.
     cost : float
         Part of the criterion that stands for parameters far from plausible, and for terms that only describe.
     """
 
-    chosen: tuple[int, ...]
-    basis: Array
-    left: Array
+    span: Span
+    shares: Array
+    products: Array
+    square_sum: float
     criterion: float
     cost: float
+
+    @property
+    def chosen(self) -> tuple[int, ...]:
+        """Indices in the bank."""
+        return self.span.chosen
+
+    @property
+    def rank(self) -> int:
+        """Number of directions."""
+        return len(self.shares)
 
 
 class Selection:
@@ -88,7 +104,8 @@ class Selection:
     ) -> None:
         self.bank, self.wanted, self.noise = bank, wanted, noise
         self.allowed, self.draws, self.seed, self._step = allowed, draws, seed, step
-        self._handicap = np.array([_EACH + _LAST * MECHANISMS[term.effect].describes for term in bank.terms])
+        kinds = [MECHANISMS[term.effect] for term in bank.terms]
+        self.handicap = np.array([_EACH + _LAST * kind.describes + _POINTS * kind.points for kind in kinds])
         self._keys = [term.key for term in bank.terms]
 
     @property
@@ -98,31 +115,48 @@ class Selection:
 
     def free(self, state: State) -> int:
         """Degrees of freedom of a state's residual."""
-        return max(self.count - 6 - int(state.basis.shape[1]), 1)
+        return max(self.count - 6 - state.rank, 1)
 
     def sigma(self, state: State) -> float:
         """Noise per coordinate that a state leaves [mm]; the known one where there is one and it is less."""
-        own = float(np.sqrt(state.left @ state.left / self.free(state)))
+        own = float(np.sqrt(state.square_sum / self.free(state)))
         return own if self.noise is None else min(own, self.noise)
 
-    def criterion(self, square_sum: Array | float, rank: Array | int, cost: Array | float) -> Array:
+    def criterion(self, square_sum: Array | float, rank: NDArray[Any] | int, cost: Array | float) -> Array:
         """Schwarz's criterion with the number of spots as sample size, plus what implausible parameters cost."""
         variance = np.maximum(np.asarray(square_sum) / self.count, 1e-12)
         return np.asarray(self.count * np.log(variance) + np.asarray(rank) * np.log(self.bank.spots) + cost)
 
     def state(self, chosen: Sequence[int], sigma: float) -> State:
         """Model of some terms."""
-        basis = self.bank.basis_of(chosen, sigma)
-        left = self.wanted - basis @ (basis.T @ self.wanted)
-        cost = float(self._handicap[list(chosen)].sum()) + self.bank.size_of(chosen, self.wanted, sigma)
-        return State(tuple(chosen), basis, left, float(self.criterion(left @ left, basis.shape[1], cost)), cost)
+        span = self.bank.span(chosen, sigma)
+        whole = self._wanted_products
+        own = [whole[self.bank.slices[index]] for index in chosen]
+        shares = span.coefficients @ np.concatenate(own) if own else np.zeros(0)
+        square_sum = max(float(self.wanted @ self.wanted - shares @ shares), 0.0)
+        values = shares @ span.coefficients
+        cost = float(self.handicap[list(chosen)].sum() + values @ values)
+        criterion = float(self.criterion(square_sum, len(shares), cost))
+        return State(span, shares, whole - shares @ span.seen, square_sum, criterion, cost)
+
+    @cached_property
+    def _wanted_products(self) -> Array:
+        return np.asarray(self.bank.columns.T @ self.wanted)
+
+    def gains(self, state: State) -> Gains:
+        """What each term explains beside a state."""
+        return self.bank.gains(state.span, state.products, self.sigma(state))
+
+    def scores(self, state: State, gains: Gains) -> Array:
+        """Normal scores (terms,) of what each term explains beside a state."""
+        return normal_score(gains.squares, gains.ranks, state.square_sum, self.free(state))
 
     def beside(self, state: State) -> Array:
         """Criterion (terms,) of a state with each term added; infinite for terms that may not be, or add nothing."""
-        gains = self.bank.gains(state.basis, state.left, self.sigma(state))
-        after = np.maximum(state.left @ state.left - gains.squares, 0.0)
-        cost = state.cost + self._handicap + gains.sizes
-        found = self.criterion(after, gains.ranks + state.basis.shape[1], cost)
+        gains = self.gains(state)
+        after = np.maximum(state.square_sum - gains.squares, 0.0)
+        cost = state.cost + self.handicap + gains.sizes
+        found = self.criterion(after, gains.ranks + state.rank, cost)
         return np.where(self.allowed & (gains.ranks > 0) & ~self._taken(state), found, np.inf)
 
     def _taken(self, state: State) -> Mask:
@@ -161,13 +195,13 @@ class Selection:
         return state
 
     def _next(self, state: State, among: Mask | None) -> int | None:
-        gains = self.bank.gains(state.basis, state.left, self.sigma(state))
+        gains = self.gains(state)
         allowed = self.allowed & ~self._taken(state) & (gains.ranks > 0)
         if among is not None:
             allowed &= among
         if not allowed.any():
             return None
-        score = np.where(allowed, scores(gains, state.left, self.free(state)), -np.inf)
+        score = np.where(allowed, self.scores(state, gains), -np.inf)
         best = float(score.max())
         if best < OBVIOUS:
             chance = self._chance(state, allowed)
@@ -182,13 +216,16 @@ class Selection:
     def _chance(self, state: State, allowed: Mask) -> Array:
         """Largest score by chance beside a state, for each draw; of very many spots on a sample of them."""
         small, rows = self._small
-        basis, left = state.basis, state.left
+        basis = self.bank.basis(state.span)
+        left = self.wanted - basis @ state.shares
+        span = state.span
         if small is not self.bank:
-            basis = small.basis_of(state.chosen, self.sigma(state))
-            left = small.project(state.left.reshape(-1, 3)[rows].ravel())
+            span = small.span(state.chosen, self.sigma(state))
+            basis = small.basis(span)
+            left = small.project(left.reshape(-1, 3)[rows].ravel())
             left = left - basis @ (basis.T @ left)
         free = max(len(left) - 6 - basis.shape[1], 1)
-        gains = small.gains(basis, left, self.sigma(state))
+        gains = small.gains(span, small.columns.T @ left, self.sigma(state))
         return largest_by_chance(small, basis, left, gains, allowed, free, draws=self.draws, seed=self.seed)
 
     @cached_property
@@ -198,19 +235,19 @@ class Selection:
     def chance_of(self, state: State, index: int) -> float:
         """P value of one term of a state, the others given."""
         rest = self.state([i for i in state.chosen if i != index], self.sigma(state))
-        gains = self.bank.gains(rest.basis, rest.left, self.sigma(state))
-        score = float(scores(gains, rest.left, self.free(rest))[index])
+        gains = self.gains(rest)
+        score = float(self.scores(rest, gains)[index])
         if score >= OBVIOUS:
             return 1.0 / (1.0 + self.draws)
         return p_value(score, self._chance(rest, self.allowed & ~self._taken(rest)))
 
     def chances(self, state: State) -> Array:
         """P value (terms,) of each term that is not in a state, were it added; 1 for those that cannot be."""
-        gains = self.bank.gains(state.basis, state.left, self.sigma(state))
+        gains = self.gains(state)
         allowed = self.allowed & ~self._taken(state) & (gains.ranks > 0)
         if not allowed.any():
             return np.ones(len(self.bank))
-        score = scores(gains, state.left, self.free(state))
+        score = self.scores(state, gains)
         chance = np.sort(self._chance(state, allowed))
         above = len(chance) - np.searchsorted(chance, score, side="left")
         return np.where(allowed, (1.0 + above) / (1.0 + len(chance)), 1.0)
@@ -257,7 +294,7 @@ class Selection:
         """Put several causes in the place of one term with many parameters, where that is better."""
         for index in state.chosen:
             rest = self.state([i for i in state.chosen if i != index], self.sigma(state))
-            if state.basis.shape[1] - rest.basis.shape[1] <= _LARGE:
+            if state.rank - rest.rank <= _LARGE:
                 continue
             small = np.array([len(term.parameters) <= _LARGE + 1 for term in self.bank.terms])
             trial = self._grow(rest, among=small & np.array([key != self._keys[index] for key in self._keys]))
@@ -285,8 +322,7 @@ class Selection:
             worst, worst_p = None, ALPHA
             for index in state.chosen:
                 rest = self.state([i for i in state.chosen if i != index], self.sigma(state))
-                gains = self.bank.gains(rest.basis, rest.left, self.sigma(state))
-                if scores(gains, rest.left, self.free(rest))[index] >= OBVIOUS:
+                if self.scores(rest, self.gains(rest))[index] >= OBVIOUS:
                     continue
                 chance = self.chance_of(state, index)
                 if chance > worst_p:

@@ -40,11 +40,6 @@ def normal_score(squares: Array, ranks: NDArray[np.intp], left: Array | float, f
     return np.where(ranks > 0, score, -np.inf)
 
 
-def scores(gains: Gains, left: Array, free: int) -> Array:
-    """Normal scores (terms,) of what each term explains of residuals ``left`` (3m,)."""
-    return normal_score(gains.squares, gains.ranks, float(left @ left), free)
-
-
 def largest_by_chance(
     bank: Bank, basis: Array, left: Array, gains: Gains, allowed: NDArray[np.bool_], free: int, *, draws: int, seed: int
 ) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from respot.calibration.effects.effect import Remedy
-from respot.calibration.effects.term import Mechanism, Parameter, Term
+from respot.calibration.effects.term import Mechanism, Parameter, Term, along
 from respot.calibration.observations import Observations
 
 NAME = "deformation"
@@ -20,11 +20,18 @@ def _terms(observations: Observations) -> list[Term]:
     centre = observations.positions.mean(axis=0)
     half = np.maximum(np.abs(observations.positions - centre).max(axis=0), 1.0)
     own = {"centre": centre.tolist(), "half": half.tolist()}
-    strain = tuple(Parameter(f"strain_{'xyz'[i]}{'xyz'[j]}", "mm", PLAUSIBLE_MM) for i, j in _STRAINS)
+    growth = tuple(Parameter(f"growth_{axis}", "mm", PLAUSIBLE_MM) for axis in "xyz")
+    # growth alike in all directions is the effect `scale`
+    strain = tuple(
+        Parameter(name, "mm", PLAUSIBLE_MM) for name in ("y_over_x", "z_over_x", "shear_xy", "shear_xz", "shear_yz")
+    )
     bend = tuple(
         Parameter(f"bend_{axis}_{'xyz'[i]}{'xyz'[j]}", "mm", PLAUSIBLE_MM) for i, j in _STRAINS for axis in "xyz"
     )
     found = [Term(NAME, {}, strain, {**own, "order": 1}), Term(NAME, {}, (*strain, *bend), {**own, "order": 2})]
+    # most parts bend or grow one way
+    found += [Term(NAME, {}, (growth[axis],), {**own, "growth": axis}) for axis in range(3)]
+    found += [Term(NAME, {}, bend[3 * k : 3 * k + 3], {**own, "bend": k}) for k in range(len(_STRAINS))]
     if len(observations) >= _LEAST_FOR_CUBES:
         twist = tuple(
             Parameter(f"twist_{axis}_{''.join('xyz'[i] for i in cube)}", "mm", PLAUSIBLE_MM)
@@ -37,12 +44,17 @@ def _terms(observations: Observations) -> list[Term]:
 
 def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
     even = (observations.positions - np.array(term.form["centre"])) / np.array(term.form["half"])
-    columns = []
-    for i, j in _STRAINS:
+    if "growth" in term.form:
+        axis = term.form["growth"]
+        return np.where(np.arange(3) == axis, even, 0.0)[:, :, None]
+    if "bend" in term.form:
+        return along(np.prod(even[:, list(_STRAINS[term.form["bend"]])], axis=1))
+    real, half = even * np.array(term.form["half"]), max(term.form["half"])
+    columns = [np.stack([-real[:, 0], real[:, 1], 0.0 * real[:, 2]], axis=1) / half]
+    columns.append(np.stack([-real[:, 0], 0.0 * real[:, 1], real[:, 2]], axis=1) / half)
+    for i, j in _STRAINS[3:]:
         column = np.zeros_like(even)
-        column[:, i] += even[:, j]
-        if i != j:
-            column[:, j] += even[:, i]
+        column[:, i], column[:, j] = real[:, j] / half, real[:, i] / half
         columns.append(column)
     powers: list[tuple[int, ...]] = []
     if term.form["order"] >= 2:

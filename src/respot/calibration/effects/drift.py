@@ -10,6 +10,7 @@ from respot.calibration.effects.term import Mechanism, Parameter, Term, motion_a
 from respot.calibration.observations import Observations
 
 DRIFT, WARMUP = "drift", "warmup"
+FAMILY = "time"
 PLAUSIBLE_MM, PLAUSIBLE_DEG = 3.0, 0.2
 _SHARES = (0.03, 0.05, 0.08, 0.12, 0.18, 0.27, 0.4, 0.6)
 _SECOND = (3.0, 8.0)
@@ -34,17 +35,19 @@ def _terms(observations: Observations, name: str) -> list[Term]:
             forms = [{"time_constant": round(span * share, 4)} for share in _SHARES]
         for form in forms:
             own = {"start": start, "span": span, "centre": centre, **form}
-            found.append(Term(name, {"column": column}, shift, {**own, "moves": "shift"}, own=column))
-            found.append(Term(name, {"column": column}, (*shift, *turn), {**own, "moves": "body"}, own=column))
+            found.append(Term(name, {"column": column}, shift, {**own, "moves": "shift"}, own=column, family=FAMILY))
+            found.append(
+                Term(name, {"column": column}, (*shift, *turn), {**own, "moves": "body"}, own=column, family=FAMILY)
+            )
             if name == DRIFT:
                 bend = tuple(Parameter(f"{each.name}_bend", each.unit, each.prior) for each in (*shift, *turn))
                 bent = {**own, "power": 2, "moves": "body"}
-                found.append(Term(name, {"column": column}, (*shift, *turn, *bend), bent, own=column))
+                found.append(Term(name, {"column": column}, (*shift, *turn, *bend), bent, own=column, family=FAMILY))
             if form:
                 slow = tuple(Parameter(f"{each.name}_slow", each.unit, each.prior) for each in (*shift, *turn))
                 for times in _SECOND:
                     two = {**own, "second_time_constant": times * form["time_constant"], "moves": "body"}
-                    found.append(Term(name, {"column": column}, (*shift, *turn, *slow), two, own=column))
+                    found.append(Term(name, {"column": column}, (*shift, *turn, *slow), two, own=column, family=FAMILY))
     return found
 
 

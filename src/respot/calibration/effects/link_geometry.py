@@ -15,6 +15,8 @@ from respot.calibration.observations import Observations
 
 NAME = "link_geometry"
 PRIOR_MM, PRIOR_DEG = 2.0, 0.573
+_FORMS = ((60, 1.0), (16, 0.3), (8, 0.1), (4, 0.1))
+"""Directions that are used, those first that the prior lets move the spots most, and the share of the prior."""
 
 
 def _terms(observations: Observations) -> list[Term]:
@@ -25,14 +27,22 @@ def _terms(observations: Observations) -> list[Term]:
         Parameter(
             f"link_{axis + 1}_{kind}", "mm" if kind[0] == "d" else "deg", PRIOR_MM if kind[0] == "d" else PRIOR_DEG
         )
-        for axis in range(observations.robot.axes)
+        for axis in range(observations.robot.axes - 1)  # the last link's errors are a tool offset
         for kind in ("dx", "dy", "dz", "rx", "ry", "rz")
     )
-    return [Term(NAME, {}, names)]
+    return [
+        Term(
+            NAME,
+            {},
+            tuple(Parameter(each.name, each.unit, each.prior * share) for each in names),
+            {"leading": leading, "prior_share": share},
+        )
+        for leading, share in _FORMS
+    ]
 
 
 def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:  # noqa: ARG001 - one place only
-    return observations.link_columns
+    return observations.link_columns[:, :, :-6]
 
 
 def _remedy(term: Term, values: NDArray[np.float64]) -> Remedy:  # noqa: ARG001

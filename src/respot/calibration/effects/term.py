@@ -50,6 +50,8 @@ class Term:
         One for each column.
     own : str
         The table column that it follows; held-out errors are never folded by it.
+    family : str
+        Effects of one family are one finding in several forms; by default an effect is its own family.
     """
 
     effect: str
@@ -57,11 +59,12 @@ class Term:
     parameters: tuple[Parameter, ...]
     form: Mapping[str, Any] = field(default_factory=dict)
     own: str = ""
+    family: str = ""
 
     @property
     def key(self) -> tuple[Any, ...]:
-        """What makes two terms the same finding: effect and place."""
-        return (self.effect, tuple(sorted((name, _frozen(value)) for name, value in self.where.items())))
+        """What makes two terms the same finding: family and place."""
+        return (self.family or self.effect, tuple(sorted((name, _frozen(value)) for name, value in self.where.items())))
 
     @property
     def label(self) -> str:
@@ -76,6 +79,7 @@ class Term:
             "form": dict(self.form),
             "parameters": [{"name": p.name, "unit": p.unit, "prior": p.prior} for p in self.parameters],
             "own": self.own,
+            "family": self.family,
         }
 
     @classmethod
@@ -91,7 +95,7 @@ class Term:
             Parameter(str(each["name"]), str(each["unit"]), float(each["prior"])) for each in record["parameters"]
         )
         where, form = dict(record["where"]), dict(record["form"])
-        return cls(str(record["effect"]), where, parameters, form, str(record["own"]))
+        return cls(str(record["effect"]), where, parameters, form, str(record["own"]), str(record["family"]))
 
 
 def _frozen(value: object) -> object:
