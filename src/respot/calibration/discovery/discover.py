@@ -29,6 +29,7 @@ LEAST_SPOTS = 10
 """With fewer spots no effect beyond names and tool is looked for."""
 _ROUNDS = 5
 _INNER_DRAWS = 299
+_ALL_FOLDS = 400
 _ALIAS = 1e-6
 _ALIAS_P = 0.01
 _HIDDEN = 0.05
@@ -237,7 +238,8 @@ def _settle(search: _Search, inliers: Mask, draws: int) -> _Found:
         selection = Selection(
             bank, wanted, search.noise, search.allowed, draws=draws, seed=search.seed, step=search.step
         )
-        state = selection.search() if len(rows) >= LEAST_SPOTS else selection.state((), 0.0)
+        start = () if found is None else found.state.chosen
+        state = selection.search(start) if len(rows) >= LEAST_SPOTS else selection.state((), 0.0)
         chosen = tuple(sorted(state.chosen))
         fit = fit_jointly(search.observations, search.reference, [search.terms[i] for i in chosen], inliers)
         found = _Found(selection, selection.state(chosen, selection.sigma(state)), fit)
@@ -381,7 +383,9 @@ def _hidden(search: _Search) -> tuple[Hidden, ...]:
 def _nested(search: _Search, inliers: Mask, labels: NDArray[np.intp], draws: int) -> Array:
     """Errors (n, 3) of each fold of spots by a model that was chosen and fitted without it [mm]."""
     errors = np.full((len(search.observations), 3), np.nan)
-    for fold in range(int(labels.max()) + 1):
+    folds = int(labels.max()) + 1
+    # a fifth of very many spots says enough, and each fold takes as long as the search itself
+    for fold in range(folds if len(errors) <= _ALL_FOLDS else 1):
         rest, out = np.flatnonzero(labels != fold), np.flatnonzero(labels == fold)
         if len(rest) < LEAST_SPOTS:
             continue

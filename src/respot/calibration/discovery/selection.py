@@ -17,7 +17,7 @@ from respot.calibration.effects.catalogue import MECHANISMS
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-MOST_EFFECTS = 6
+MOST_EFFECTS, SPOTS_FOR_AN_EFFECT = 12, 12
 _LAST = 10.0
 """A term that only describes must be better by this much (as `Selection.criterion`) than one that may be a cause."""
 _POINTS = 8.0
@@ -123,9 +123,9 @@ class Selection:
         return own if self.noise is None else min(own, self.noise)
 
     def criterion(self, square_sum: Array | float, rank: NDArray[Any] | int, cost: Array | float) -> Array:
-        """Schwarz's criterion with the number of spots as sample size, plus what implausible parameters cost."""
+        """Schwarz's criterion, plus what implausible parameters cost."""
         variance = np.maximum(np.asarray(square_sum) / self.count, 1e-12)
-        return np.asarray(self.count * np.log(variance) + np.asarray(rank) * np.log(self.bank.spots) + cost)
+        return np.asarray(self.count * np.log(variance) + np.asarray(rank) * np.log(self.count) + cost)
 
     def state(self, chosen: Sequence[int], sigma: float) -> State:
         """Model of some terms."""
@@ -171,10 +171,15 @@ class Selection:
             ]
         )
 
-    def search(self) -> State:
-        """Find the set of terms."""
+    @property
+    def most(self) -> int:
+        """Number of effects at most: one for each dozen of spots."""
+        return int(np.clip(self.bank.spots // SPOTS_FOR_AN_EFFECT, 3, MOST_EFFECTS))
+
+    def search(self, start: Sequence[int] = ()) -> State:
+        """Find the set of terms, beginning with some."""
         sigma = self.sigma(self.state((), 0.0))
-        state = self.state((), sigma)
+        state = self.state(start, sigma)
         for _ in range(_ROUNDS):
             grown = self._split(self._improve(self._grow(state)))
             better = self._prune(grown)
@@ -185,7 +190,7 @@ class Selection:
 
     def _grow(self, state: State, among: Mask | None = None) -> State:
         """Forward steps, as long as the best term beats what the best of all gains by chance."""
-        while len(state.chosen) < MOST_EFFECTS:
+        while len(state.chosen) < self.most:
             found = self._next(state, among)
             if found is None:
                 break
@@ -254,7 +259,7 @@ class Selection:
 
     def _exchange(self, state: State, among: Mask | None = None) -> State:
         """Replace one term by another as long as the criterion falls."""
-        for _ in range(4 * MOST_EFFECTS):
+        for _ in range(4 * self.most):
             best, changed = state, False
             for index in state.chosen:
                 rest = self.state([i for i in state.chosen if i != index], self.sigma(state))
