@@ -64,7 +64,7 @@ def test_a_joint_that_stands_wrong_moves_the_tool_as_the_arm_does():
         "scipy.spatial.transform", fromlist=["RigidTransform"]
     ).RigidTransform.from_components(SEEN.points_in_base, SEEN.rotations)
     turned = SEEN.joints + np.array([0.0, 0.0, 5.0, 0.0, 0.0, 0.0])
-    there = SEEN.robot.forward(turned) * tool
+    there = SEEN.base2source * SEEN.robot.forward(turned) * tool
     assert np.abs(np.asarray(there.translation) - points).max() < 1e-9
     assert np.abs((there.rotation.inv() * rotations).magnitude()).max() < 1e-9
 
