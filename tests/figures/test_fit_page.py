@@ -74,7 +74,7 @@ def text_of(record: dict[str, Any], **more: Any) -> str:
         "Only in the source : SP097, SP098, SP099 and SP100",
         "Only in the reference : TB_01 and TB_02",
         "SP003 = sp_003",
-        "programs for the real cell",
+        "where the real robot goes",
         "the spots miss by 1.42 mm RMS",
         "What is left points mostly along y (direction 0.10, 0.99, 0.10), 3 times as much",
         "0.120 ± 0.013 degrees",

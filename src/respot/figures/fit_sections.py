@@ -55,8 +55,7 @@ def compared(record: Record, source: str, reference: str) -> dict[str, Any]:
         "Writing this back with respot convert makes programs for the cell as simulated: their points sit where the "
         "theory has them. The real, old cell must never load those files."
         if theory
-        else "Writing this back with respot convert makes programs for the real cell, whose robot then lands where the "
-        "old programs meant it to."
+        else "This says where the real robot goes. It changes no program by itself: remove the causes below first."
     )
     matching = record.get("matching") or {}
     by = "place (geometry)" if matching.get("by") == "geometry" else "name (ID)"

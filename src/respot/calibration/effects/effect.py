@@ -51,6 +51,7 @@ class Effect:
             "rivals": [{"name": rival.name, "heldout_rms": rival.heldout_rms} for rival in self.rivals],
             "p_value": self.p_value,
             "heldout_gain": self.heldout_gain,
+            "heldout_rms": self.evidence.get("heldout_rms"),
             "remedy": {"where": self.remedy.where, "text": self.remedy.text},
             "evidence": dict(self.evidence),
         }
