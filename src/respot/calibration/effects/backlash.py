@@ -20,7 +20,9 @@ def _terms(observations: Observations) -> list[Term]:
     both = [axis for axis in range(signs.shape[1]) if np.any(signs[:, axis] > 0.0) and np.any(signs[:, axis] < 0.0)]
     found = []
     for axis in both:
-        names = tuple(Parameter(f"axis_{axis + 1}_{way}", "deg", PLAUSIBLE_DEG) for way in ("up", "down"))
+        # what is alike from both sides is a mastering error; of the last axis a tool offset, which cannot be told apart
+        ways = ("half_play",) if axis == signs.shape[1] - 1 else ("up", "down")
+        names = tuple(Parameter(f"axis_{axis + 1}_{way}", "deg", PLAUSIBLE_DEG) for way in ways)
         found.append(Term(NAME, {"axis": axis + 1}, names, own=f"approach_a{axis + 1}"))
     return found
 
@@ -28,10 +30,13 @@ def _terms(observations: Observations) -> list[Term]:
 def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
     assert observations.joints is not None  # noqa: S101
     signs = observations.approach
-    columns = np.zeros((*observations.joints.shape, 2))
+    columns = np.zeros((*observations.joints.shape, len(term.parameters)))
     if signs is None:
         return columns
     axis = term.where["axis"] - 1
+    if len(term.parameters) == 1:
+        columns[:, axis, 0] = np.sign(signs[:, axis])
+        return columns
     columns[:, axis, 0] = signs[:, axis] > 0.0
     columns[:, axis, 1] = signs[:, axis] < 0.0
     return columns
@@ -39,7 +44,7 @@ def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
 
 def _remedy(term: Term, values: NDArray[np.float64]) -> Remedy:
     axis = term.where["axis"]
-    play = abs(float(values[0] - values[1]))
+    play = 2.0 * abs(float(values[0])) if len(values) == 1 else abs(float(values[0] - values[1]))
     text = (
         f"Axis {axis} stops {play:.4f} degrees apart when it comes from one side or from the other: play in its gear. "
         "Have the gear checked; until then approach the spots from the same side, or correct the points for the side "

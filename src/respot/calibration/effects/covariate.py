@@ -37,7 +37,9 @@ def _numeric(observations: Observations, name: str, column: Covariate) -> list[T
     distinct = np.unique(column.values)
     start, span = float(distinct[0]), float(distinct[-1] - distinct[0])
     place = {"column": name}
-    own = {"start": start, "span": span}
+    # an error that is alike everywhere is a tool offset's or the rigid part's, not the column's
+    middle = float(np.mean((column.values - start) / span))
+    own = {"start": start, "span": span, "middle": middle}
     shift = vector("", "mm", PLAUSIBLE_MM)
     frames = ["part"] if observations.rotations is None else ["part", "tool"]
     # time's own straight and saturating forms are drift and warm-up, a counter's in the tool is wear
@@ -75,9 +77,17 @@ def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
         return np.concatenate([along(np.cos(angle)), along(np.sin(angle))], axis=2)
     if term.form["shape"] == "saturating":
         even = 1.0 - np.exp(-even * term.form["span"] / term.form["scale"])
+    even = even - _at_middle(term)
     if term.form["frame"] == "tool":
         return np.asarray(observations.tools * even[:, None, None])
     return along(even)
+
+
+def _at_middle(term: Term) -> float:
+    middle = float(term.form["middle"])
+    if term.form["shape"] == "saturating":
+        return 1.0 - float(np.exp(-middle * term.form["span"] / term.form["scale"]))
+    return middle
 
 
 def _remedy(term: Term, values: NDArray[np.float64]) -> Remedy:
