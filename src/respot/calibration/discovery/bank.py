@@ -87,9 +87,12 @@ class Bank:
         As `columns_of`, of the m spots that count.
     points : (m, 3) array
         Where these spots are, with the effects that are in the model already, source frame [mm].
+    even : (3, 3) array, optional
+        What makes the noise alike along all axes of the source frame: all shifts are seen through it.
     """
 
-    def __init__(self, terms: Sequence[Term], columns: Array, points: Array) -> None:
+    def __init__(self, terms: Sequence[Term], columns: Array, points: Array, even: Array | None = None) -> None:
+        self._even = even
         self.spots = len(points)
         self.terms = tuple(terms)
         sizes = np.array([len(term.parameters) for term in self.terms], dtype=np.intp)
@@ -97,12 +100,12 @@ class Bank:
         self.leading = np.array([term.form.get("leading", len(term.parameters)) for term in self.terms], dtype=np.intp)
         stops = np.cumsum(sizes)
         self.slices = [slice(int(stop - size), int(stop)) for size, stop in zip(sizes, stops, strict=True)]
-        columns = np.ascontiguousarray(columns.reshape(3 * self.spots, -1))
+        columns = np.ascontiguousarray(self.evened(columns).reshape(3 * self.spots, -1))
         self.raw = np.einsum("ij,ij->j", columns, columns)
         self._points = points
         points = points - points.mean(axis=0)
         extent = max(float(np.sqrt(np.mean(points**2))), 1e-9)
-        self.rigid = np.linalg.qr(jacobian(points / extent).reshape(-1, 6))[0]
+        self.rigid = np.linalg.qr(self.evened(jacobian(points / extent)).reshape(-1, 6))[0]
         for _ in range(2):  # products lose half of the digits
             columns = columns - self.rigid @ (self.rigid.T @ columns)
         self.columns = columns
@@ -135,12 +138,21 @@ class Bank:
         left = np.einsum("ij,ij->j", self.columns, self.columns)
         return np.array([np.sqrt(left[part].sum() / max(float(self.raw[part].sum()), 1e-300)) for part in self.slices])
 
+    def evened(self, shifts: Array) -> Array:
+        """Shifts (m, 3, ...) of the source frame as the bank sees them."""
+        if self._even is None:
+            return shifts
+        return np.asarray(np.einsum("ij,nj...->ni...", self._even, shifts))
+
     def sample(self, most: int, seed: int) -> tuple[Bank, Rows]:
         """Return a bank of no more than ``most`` spots, and which they are."""
         if self.spots <= most:
             return self, np.arange(self.spots)
         rows = np.sort(np.random.default_rng(seed).permutation(self.spots)[:most])
-        return Bank(self.terms, self.columns.reshape(self.spots, 3, -1)[rows], self._points[rows]), rows
+        part = Bank(self.terms, self.columns.reshape(self.spots, 3, -1)[rows], self._points[rows])
+        part.rigid = np.linalg.qr(self.rigid.reshape(self.spots, 3, -1)[rows].reshape(-1, 6))[0]
+        part.columns = part.columns - part.rigid @ (part.rigid.T @ part.columns)
+        return part, rows
 
     @cached_property
     def rough(self) -> NDArray[np.float32]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from respot.calibration.discovery.bank import Bank, columns_of
+from respot.calibration.discovery.evening import evening
 from respot.calibration.discovery.heldout import HeldOut, folds_of, heldout
 from respot.calibration.discovery.joint_fit import JointFit, fit_jointly
 from respot.calibration.discovery.outliers import misfit, settled
@@ -233,8 +234,9 @@ def _settle(search: _Search, inliers: Mask, draws: int) -> _Found:
     found: _Found | None = None
     for _ in range(_ROUNDS):
         rows = np.flatnonzero(inliers)
-        bank = Bank(search.terms, search.columns[rows], fit.moved[rows])
-        wanted = bank.project(fit.linear[rows].ravel())
+        even = None if found is None else evening(fit)
+        bank = Bank(search.terms, search.columns[rows], fit.moved[rows], even)
+        wanted = bank.project(bank.evened(fit.linear[rows]).ravel())
         selection = Selection(
             bank, wanted, search.noise, search.allowed, draws=draws, seed=search.seed, step=search.step
         )
@@ -245,7 +247,8 @@ def _settle(search: _Search, inliers: Mask, draws: int) -> _Found:
         found = _Found(selection, selection.state(chosen, selection.sigma(state)), fit)
         inliers = settled(fit)
         key = (np.packbits(inliers).tobytes(), chosen)
-        if key in seen:
+        # once more where the noise turns out not to be alike along all axes
+        if key in seen and (even is not None) == (evening(fit) is not None):
             break
         seen.add(key)
         if not np.array_equal(inliers, fit.inliers):
@@ -276,10 +279,10 @@ def _gated(search: _Search, found: _Found) -> _Found:
         worst = min(failing)[1]
         chosen = tuple(i for i in found.state.chosen if i != worst)
         fit = fit_jointly(search.observations, search.reference, [search.terms[i] for i in chosen], found.fit.inliers)
-        bank = Bank(search.terms, search.columns[rows], fit.moved[rows])
+        bank = Bank(search.terms, search.columns[rows], fit.moved[rows], evening(fit))
         selection = Selection(
             bank,
-            bank.project(fit.linear[rows].ravel()),
+            bank.project(bank.evened(fit.linear[rows]).ravel()),
             search.noise,
             search.allowed,
             draws=found.selection.draws,

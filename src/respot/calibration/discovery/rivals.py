@@ -80,14 +80,12 @@ def rival_table(
     bank = selection.bank
     sigma = selection.sigma(state)
     rest = selection.state([i for i in state.chosen if i != index], sigma)
-    # what an explanation costs for being no cause decides which is taken, not how far the data speak against another
-    criteria = selection.beside(rest) - selection.handicap
+    criteria = selection.apart(rest, index)
     own = bank.terms[index]
     own_rows = bank.span([*rest.chosen, index], sigma)
     # of the same finding the form does not matter
     seen = {own.key}
     found: list[tuple[Term, HeldOut, float, bool]] = []
-    base = float(min(state.criterion - selection.handicap[index], criteria[index]))
     for other in np.argsort(criteria).tolist():
         if not np.isfinite(criteria[other]) or len(found) == _SHOWN:
             break
@@ -95,7 +93,7 @@ def rival_table(
         if term.key in seen:
             continue
         seen.add(term.key)
-        apart = float(criteria[other] - base)
+        apart = float(criteria[other])
         if _holds(bank, bank.span([*rest.chosen, other], sigma), own_rows, rest.rank):
             continue
         others = [bank.terms[i] for i in rest.chosen] + [term]

@@ -25,6 +25,7 @@ _POINTS = 8.0
 _EACH = 4.0
 """What each effect costs beside its parameters: one cause before two."""
 _BETTER = 0.5
+_AKAIKE = 2.0
 _LARGE = 5
 """Terms with more directions than this may stand for several causes at once."""
 _CANDIDATES = 12
@@ -122,10 +123,13 @@ class Selection:
         own = float(np.sqrt(state.square_sum / self.free(state)))
         return own if self.noise is None else min(own, self.noise)
 
-    def criterion(self, square_sum: Array | float, rank: NDArray[Any] | int, cost: Array | float) -> Array:
-        """Schwarz's criterion, plus what implausible parameters cost."""
+    def criterion(
+        self, square_sum: Array | float, rank: NDArray[Any] | int, cost: Array | float, each: float | None = None
+    ) -> Array:
+        """Schwarz's criterion, plus what implausible parameters cost; or with another price for each direction."""
         variance = np.maximum(np.asarray(square_sum) / self.count, 1e-12)
-        return np.asarray(self.count * np.log(variance) + np.asarray(rank) * np.log(self.count) + cost)
+        price = np.log(self.count) if each is None else each
+        return np.asarray(self.count * np.log(variance) + np.asarray(rank) * price + cost)
 
     def state(self, chosen: Sequence[int], sigma: float) -> State:
         """Model of some terms."""
@@ -150,6 +154,18 @@ class Selection:
     def scores(self, state: State, gains: Gains) -> Array:
         """Normal scores (terms,) of what each term explains beside a state."""
         return normal_score(gains.squares, gains.ranks, state.square_sum, self.free(state))
+
+    def apart(self, rest: State, index: int) -> Array:
+        """By how much each term in the place of one explains a state's rest worse than it does, (terms,).
+
+        As `criterion`, but with Akaike's price of a direction: that another explanation needs more parameters is a
+        reason to prefer this one, none to call it proved.
+        """
+        gains = self.gains(rest)
+        after = np.maximum(rest.square_sum - gains.squares, 0.0)
+        found = self.criterion(after, gains.ranks, gains.sizes, _AKAIKE)
+        usable = self.allowed & (gains.ranks > 0) & ~self._taken(rest)
+        return np.where(usable, found - found[index], np.inf)
 
     def beside(self, state: State) -> Array:
         """Criterion (terms,) of a state with each term added; infinite for terms that may not be, or add nothing."""

@@ -7,8 +7,11 @@ with all inner scans (time constants, harmonics) counted in.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special, stats
 
 from respot.calibration.discovery.bank import Bank, Gains
 
@@ -17,27 +20,45 @@ Array = NDArray[np.float64]
 ALPHA = 0.01
 DRAWS = 1000
 _AT_ONCE = 250
+_LEAST_LOG = -600.0
 
 
 def normal_score(squares: Array, ranks: NDArray[np.intp], left: Array | float, free: int) -> Array:
-    """Gains as normal scores, comparable over terms of different size: the F value by Wilson and Hilferty (1931).
+    """Gains as normal scores, comparable over terms of different size: as unlikely a normal number as the F value.
 
     Parameters
     ----------
     squares, ranks : arrays
-        Sum of squares explained [mm^2], and directions used.
+        Sum of squares explained [mm^2], and directions used; ranks may have fewer axes at the end.
     left : array or float
         Sum of squares before [mm^2].
     free : int
         Degrees of freedom before.
     """
-    rest = np.maximum(free - ranks, 1.0)
-    used = np.maximum(ranks, 1.0)
-    ratio = (squares / used) / np.maximum((left - squares) / rest, 1e-300)
-    root = np.cbrt(ratio)
-    first, second = 2.0 / (9.0 * used), 2.0 / (9.0 * rest)
-    score = ((1.0 - second) * root - (1.0 - first)) / np.sqrt(second * root**2 + first)
-    return np.where(ranks > 0, score, -np.inf)
+    score = np.full(np.broadcast_shapes(np.shape(squares), np.shape(ranks)), -np.inf)
+    ratio = np.log(np.maximum(squares, 1e-300) / np.maximum(left - squares, 1e-300))
+    for rank in np.unique(ranks):
+        if rank > 0:
+            rows = np.broadcast_to(ranks == rank, score.shape)
+            grid, scores = _score_table(int(rank), max(free - int(rank), 1))
+            score[rows] = np.interp(ratio[rows], grid, scores)
+    return score
+
+
+@lru_cache(maxsize=4096)
+def _score_table(rank: int, rest: int) -> tuple[Array, Array]:
+    """Logarithm of explained over unexplained squares, and its normal score; straight on beyond what numbers hold."""
+    grid = np.linspace(-12.0, 12.0, 1500)
+    values = np.exp(grid) * rest / rank
+    tail = stats.f.logsf(values, rank, rest)
+    known = tail > _LEAST_LOG
+    scores = np.where(known, -special.ndtri_exp(np.where(known, tail, -1.0)), 0.0)
+    last = int(np.flatnonzero(known)[-1])
+    # a tail of exp(-s^2 / 2): the score goes on as the root of its logarithm does
+    beyond = np.sqrt(
+        np.maximum(scores[last] ** 2 + rest * (np.logaddexp(0.0, grid) - np.logaddexp(0.0, grid[last])), 0.0)
+    )
+    return grid, np.where(np.arange(len(grid)) <= last, scores, beyond)
 
 
 def largest_by_chance(
