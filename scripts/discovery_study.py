@@ -31,14 +31,24 @@ from typing import Any
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: one thread for each of our processes
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
 from scipy.spatial.transform import RigidTransform
 
 from respot.calibration.covariates import covariates_of
+from respot.calibration.discovery.bank import Bank, columns_of
 from respot.calibration.discovery.discover import Discovery, discover
+from respot.calibration.discovery.joint_fit import fit_jointly
+from respot.calibration.discovery.selection import Selection
+from respot.calibration.effects.catalogue import terms_of
+from respot.calibration.effects.moved import moved
 from respot.calibration.observations import Observations
 from respot.kinematics.robots import find_robot
 from respot.registration.exchanged import find_exchanged
+from respot.registration.leave_one_out import without_folds
 from respot.simulation import EFFECTS, OUTSIDE, Line, simulate
+
+Array = NDArray[np.float64]
 
 ROBOT = "kr210_r2700_extra"
 NOISE = {"easy": 0.1, "hard": 0.3}
@@ -300,6 +310,97 @@ def outside(seeds: range, verbose: bool) -> None:
     print(f"{'all':16}{'':5}{shares[0]:13.1%}{shares[1]:33.1%}")
 
 
+def _oracle(line: Line, seen: Observations, folds: NDArray[np.intp]) -> Array:
+    """Errors (n, 3) against the noise-free truth of a fit that knows the effects, each fold held out [mm]."""
+    bank_terms = terms_of(seen)
+    columns = columns_of(seen, bank_terms)
+    fit = fit_jointly(seen, line.measured, (), np.ones(line.n, dtype=np.bool_))
+    bank = Bank(bank_terms, columns, seen.positions)
+    wanted = bank.project(fit.linear.ravel())
+    every = np.ones(len(bank_terms), dtype=np.bool_)
+    selection = Selection(bank, wanted, line.noise, every, draws=1, seed=0)
+    chosen: list[int] = []
+    for truth in line.truth:
+        own = [k for k, term in enumerate(bank_terms) if same(truth, term.effect, term.where)]
+        chosen.append(min(own, key=lambda k: selection.state([*chosen, k], line.noise).criterion))
+    terms = [bank_terms[k] for k in chosen]
+    errors = np.full((line.n, 3), np.nan)
+    for fold in np.unique(folds):
+        rest, out = np.flatnonzero(folds != fold), np.flatnonzero(folds == fold)
+        part = seen.rows(rest)
+        model = fit_jointly(part, line.measured[rest], terms, np.ones(len(rest), dtype=np.bool_))
+        places, _ = moved(seen.rows(out), model.terms, model.values)
+        errors[out] = places @ model.rotation.T + model.translation - line.measured_true[out]
+    return errors
+
+
+def _against_oracle(seed: int) -> tuple[float, float, float]:
+    dice = np.random.default_rng((11, seed))
+    names = dice.permutation(_names())[: int(dice.integers(1, 3))]
+    effects = tuple(f"{name}:{np.exp(dice.uniform(np.log(0.3), np.log(3.0))):.3f}" for name in names)
+    line = simulate(ROBOT, 120, NOISE["easy"], effects, seed, "easy", rail="rail" in names)
+    found = look(line, nested=True, draws=300)
+    folds = found.nested_folds
+    if found.nested is None or folds is None:
+        return float("nan"), float("nan"), float("nan")
+    ours = found.nested + line.measured - line.measured_true
+    known = _oracle(line, observations_of(line), folds)
+    before = without_folds(line.positions, line.measured, folds) + line.measured - line.measured_true
+    first, second, third = (float(np.sqrt(np.mean(np.sum(e**2, axis=1)))) for e in (before, ours, known))
+    return first, second, third
+
+
+def against_oracle(seeds: range, verbose: bool) -> None:
+    """Print held-out errors against the noise-free truth beside an oracle."""
+    with ProcessPoolExecutor() as pool:
+        rows = np.array(list(pool.map(_against_oracle, seeds)))
+    rows = rows[np.isfinite(rows).all(axis=1)]
+    before, ours, known = np.median(rows, axis=0)
+    ratios = rows[:, 1] / rows[:, 2]
+    print(
+        f"\nheld out, against the noise-free truth, medians of {len(rows)} lines with one or two effects: rigid "
+        f"{before:.3f} mm, ours {ours:.4f} mm, an oracle that knows the effects {known:.4f} mm; ratio: median "
+        f"{np.median(ratios):.3f}, 90 % below {np.quantile(ratios, 0.9):.3f}"
+    )
+    if verbose:
+        print("    " + " ".join(f"{ratio:.2f}" for ratio in np.sort(ratios)))
+
+
+TRUE_VALUES: dict[str, Callable[[Mapping[str, Any]], list[float]]] = {
+    "joint_zero": lambda parameters: [parameters["zero_deg"]],
+    "tool_offset": lambda parameters: list(parameters["offset_mm"]),
+    "link_length": lambda parameters: [parameters["error_mm"]],
+    "scale": lambda parameters: [parameters["per_mille"]],
+}
+
+
+def coverage(seeds: range, verbose: bool) -> None:
+    """Print how often 95 % intervals hold the truth, given the right model."""
+    del verbose
+    print("\n95 % intervals of parameters that hold the truth, given the right model")
+    for name, values in TRUE_VALUES.items():
+        held: list[bool] = []
+        for seed in seeds:
+            line = simulate(ROBOT, 120, NOISE["easy"], (f"{name}:1",), seed, "easy")
+            seen = observations_of(line)
+            term = next(t for t in terms_of(seen) if same(line.truth[0], t.effect, t.where))
+            fit = fit_jointly(seen, line.measured, [term], np.ones(line.n, dtype=np.bool_))
+            reach = stats.t.ppf(0.975, fit.free) * fit.value_sd[0]
+            held += (np.abs(fit.values[0] - np.array(values(line.truth[0]["parameters"]))) <= reach).tolist()
+        print(f"{name:16}{len(held):6} intervals, {np.mean(held):.1%} hold", flush=True)
+
+
+def seconds(seeds: range, verbose: bool) -> None:
+    """Print how long a search takes, with errors of spots that took no part."""
+    del seeds, verbose
+    for spots in (120, 2000):
+        line = simulate(ROBOT, spots, NOISE["easy"], ("joint_zero@3:0.8", "tip_wear:0.6"), 3, "easy")
+        start = time.perf_counter()
+        found = look(line, nested=True)
+        names = ", ".join(each.term.label for each in found.accepted)
+        print(f"{spots} spots, {len(line.columns)} columns: {time.perf_counter() - start:.1f} s ({names})", flush=True)
+
+
 def main() -> None:
     """Run one part."""
     parts: dict[str, Callable[[range, bool], None]] = {
@@ -311,6 +412,9 @@ def main() -> None:
         "triples": lambda seeds, verbose: several(seeds, 3, verbose),
         "nothing": nothing,
         "outside": outside,
+        "heldout": against_oracle,
+        "coverage": coverage,
+        "time": seconds,
     }
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("part", choices=parts)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
@@ -70,11 +72,17 @@ def _judge(columns: Array, wanted: Array, inliers: Mask, ridge: Array) -> tuple[
     free = max(3.0 * count - used, 1.0)
     less = max(free - 3.0, 1.0)
     floor = SCALE_FLOOR**2
-    limit_out, limit_in = 3.0 * float(stats.f.ppf(LEVEL, 3, free)), 3.0 * float(stats.f.ppf(LEVEL, 3, less))
+    limit_out, limit_in = _limit(round(free, 1)), _limit(round(less, 1))
     outside = values / (max(total / free, floor) * limit_out)
     inside = values / (np.maximum((total - values) / less, floor) * limit_in)
     excess = np.where(inliers, inside, outside)
     return heldout, excess <= 1.0, excess
+
+
+@lru_cache(maxsize=1024)
+def _limit(free: float) -> float:
+    """Largest test value of a good spot, by the degrees of freedom of the noise."""
+    return 3.0 * float(stats.f.ppf(LEVEL, 3, free))
 
 
 def misfit(fit: JointFit) -> float:

@@ -26,6 +26,7 @@ _EACH = 4.0
 """What each effect costs beside its parameters: one cause before two."""
 _BETTER = 0.5
 _AKAIKE = 2.0
+_KEPT = 200
 _LARGE = 5
 """Terms with more directions than this may stand for several causes at once."""
 _CANDIDATES = 12
@@ -105,6 +106,8 @@ class Selection:
     ) -> None:
         self.bank, self.wanted, self.noise = bank, wanted, noise
         self.allowed, self.draws, self.seed, self._step = allowed, draws, seed, step
+        self._gains: dict[tuple[int, ...], tuple[State, Gains]] = {}
+        self._states: dict[tuple[tuple[int, ...], float], State] = {}
         kinds = [MECHANISMS[term.effect] for term in bank.terms]
         self.handicap = np.array([_EACH + _LAST * kind.describes + _POINTS * kind.points for kind in kinds])
         self._keys = [term.key for term in bank.terms]
@@ -133,6 +136,15 @@ class Selection:
 
     def state(self, chosen: Sequence[int], sigma: float) -> State:
         """Model of some terms."""
+        key = (tuple(chosen), sigma)
+        found = self._states.get(key)
+        if found is None:
+            if len(self._states) > _KEPT:
+                self._states.clear()
+            found = self._states[key] = self._made(key[0], sigma)
+        return found
+
+    def _made(self, chosen: tuple[int, ...], sigma: float) -> State:
         span = self.bank.span(chosen, sigma)
         whole = self._wanted_products
         own = [whole[self.bank.slices[index]] for index in chosen]
@@ -149,7 +161,12 @@ class Selection:
 
     def gains(self, state: State) -> Gains:
         """What each term explains beside a state."""
-        return self.bank.gains(state.span, state.products, self.sigma(state))
+        found = self._gains.get(state.chosen)
+        if found is None or found[0] is not state:
+            if len(self._gains) > _KEPT:
+                self._gains.clear()
+            found = self._gains[state.chosen] = (state, self.bank.gains(state.span, state.products, self.sigma(state)))
+        return found[1]
 
     def scores(self, state: State, gains: Gains) -> Array:
         """Normal scores (terms,) of what each term explains beside a state."""

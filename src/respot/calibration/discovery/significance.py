@@ -99,8 +99,10 @@ def largest_by_chance(
                 continue
             shares = gains.whiteners[size][use] @ products[bank.places[size][use]]
             squares = np.einsum("tkd,tkd->td", shares, shares)
-            each = normal_score(squares, gains.ranks[members[use]][:, None], totals, free)
-            best = np.maximum(best, each.max(axis=0))
+            ranks = gains.ranks[members[use]]
+            for rank in np.unique(ranks):  # of terms of one rank the largest gain has the largest score
+                largest = squares[ranks == rank].max(axis=0)
+                best = np.maximum(best, normal_score(largest, np.array(rank), totals, free))
         found.append(best)
     return np.concatenate(found)
 
