@@ -276,11 +276,12 @@ def read_for(calibration: Calibration, path: Path, options: UseOptions) -> tuple
     issues = []
     if is_backup(path) or options.robot is None:
         source = read_source(path, calibration.ids, options.spot_id, options.robot_name, options.profiles)
-        if options.robot is not None:
+        if options.robot is not None and not calibration.terms:
             issues.append(Issue("OPTION_UNUSED", "--robot is for tables of joints; the programs tell poses", str(path)))
     else:
         source, used = table_of_joints(path, options.robot)
-        issues.append(used)
+        if used.code != "OPTION_UNUSED" or not calibration.terms:  # effects of the arm need the robot as well
+            issues.append(used)
     if not source.spots.ids:
         detail = f": {source.spots.issues[0]}" if source.spots.issues else "; --spot-id REGEX tells how they are named"
         raise BadInputError("NO_COMMON_IDS", f"holds no weld spot that can be used{detail}", str(path))

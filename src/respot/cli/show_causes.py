@@ -68,7 +68,7 @@ def _show_lost(fit: SpotFit, record: Mapping[str, Any]) -> None:
     trial = fit.tool
     if trial is not None and not trial.accepted and trial.figures is not None:
         line(f"  tool_offset was tried and is not part of the model: {trial.verdict}")
-    tried = [each for each in record["effects_tried"] if each["name"] != "tool_offset"]
+    tried = [each for each in record["effects_tried"] if each["name"] not in _SHOWN_ELSEWHERE]
     if tried:
         names = [f"{each['name']} {place(each['where'])}".strip() for each in tried[:_MOST_TRIED]]
         more = f" and {len(tried) - _MOST_TRIED} more" if len(tried) > _MOST_TRIED else ""

@@ -201,7 +201,8 @@ class Selection:
             [
                 key in keys or (term.effect == "covariate" and term.own in owned)
                 for key, term in zip(self._keys, self.bank.terms, strict=True)
-            ]
+            ],
+            dtype=np.bool_,
         )
 
     @property

@@ -1,0 +1,140 @@
+"""Hidden effects from the command line: simulate, fit, keep, predict, validate, convert."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(scope="module")
+def practice(tmp_path_factory):
+    from typer.testing import CliRunner
+
+    from respot.cli import app
+
+    folder = tmp_path_factory.mktemp("line") / "practice"
+    arguments = ["simulate", str(folder), "--spots", "44", "--seed", "5"]
+    result = CliRunner().invoke(app, [*arguments, "--effect", "joint_zero@3:1.5", "--effect", "tip_wear:1.5"])
+    assert result.exit_code == 0, result.stderr
+    return folder
+
+
+def codes(result) -> list[str]:
+    return [issue["code"] for issue in result.json["issues"]]
+
+
+def fitted(respot, practice: Path, *options: object):
+    names = ["--effects", "swapped_ids,tool_offset,joint_zero,tip_wear"]
+    measured = practice / "measured.csv"
+    robot = practice / "robot.toml"
+    return respot(
+        "fit", practice / "programmed.csv", "--measured", measured, "--robot", robot, "--noise", "0.1", *names, *options
+    )
+
+
+def test_a_table_with_joints_and_a_robot(respot, practice, tmp_path):
+    result = fitted(respot, practice, "-o", "cal.json", "--report", "page.html")
+    assert result.code == 0, result.err
+    assert "joint_zero axis 3 (named)" in result.out
+    assert "tip_wear column welds_since_cap (named)" in result.out
+    assert "spots that took no part falls" in result.out
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "Two causes were found" in page
+    assert "<script" not in page
+    robot = practice / "robot.toml"
+    blind = respot("predict", practice / "programmed.csv", "-c", "cal.json", "--robot", robot, "--json")
+    assert "EFFECT_LEFT_OUT" in codes(blind)
+    seen = respot(
+        "predict",
+        practice / "programmed.csv",
+        "-c",
+        "cal.json",
+        "--covariates",
+        practice / "measured.csv",
+        "--json",
+    )
+    assert "EFFECT_LEFT_OUT" not in codes(seen)
+    wide, narrow = (max(spot["ci95"] for spot in each.json["spots"]) for each in (blind, seen))
+    assert wide > 3.0 * narrow
+    with (practice / "measured.csv").open(encoding="utf-8", newline="") as file:
+        real = {row["id"]: [float(row[axis]) for axis in "xyz"] for row in csv.DictReader(file)}
+    far = [
+        sum((spot[axis] - there) ** 2 for axis, there in zip("xyz", real[spot["id"]], strict=True)) ** 0.5
+        for spot in seen.json["spots"]
+    ]
+    assert max(far) < 0.5
+    kept = respot("validate", practice / "backup", "--measured", practice / "measured.csv", "-c", "cal.json", "--json")
+    assert kept.json["kept"] is True
+    refused = respot("convert", practice / "backup", "-c", "cal.json", "-o", "out")
+    assert refused.code == 2
+    assert "effects" in refused.err
+    assert not (tmp_path / "out").exists()
+
+
+def test_json_says_what_was_tried_hidden_and_left(respot, practice):
+    record = fitted(respot, practice, "--json").json
+    assert {effect["name"] for effect in record["effects"]} == {"joint_zero", "tip_wear"}
+    assert record["noise"]["reached"] is True
+    assert record["heldout"]["after"]["rms"] < 0.3 * record["heldout"]["before"]["rms"]
+    assert {"joint_zero"} <= {each["name"] for each in record["hidden"]}
+    assert record["unexplained"]["present"] is False
+
+
+def test_joints_of_another_robot_are_not_used(respot, practice):
+    measured = practice / "measured.csv"
+    result = respot(
+        "fit",
+        practice / "programmed.csv",
+        "--measured",
+        measured,
+        "--robot",
+        "kr16_2",
+        "--effects",
+        "joint_zero",
+        "--json",
+    )
+    assert result.code == 0, result.err
+    assert "JOINTS_NOT_USED" in codes(result)
+    assert result.json["effects"] == []
+
+
+def test_an_effect_without_what_it_needs_finds_nothing(respot, practice):
+    with (practice / "programmed.csv").open(encoding="utf-8", newline="") as file:
+        rows = [{key: row[key] for key in ("id", "x", "y", "z")} for row in csv.DictReader(file)]
+    with Path("bare.csv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, ["id", "x", "y", "z"])
+        writer.writeheader()
+        writer.writerows(rows)
+    result = respot("fit", "bare.csv", "--measured", practice / "measured.csv", "--effects", "joint_zero", "--json")
+    assert result.code == 0, result.err
+    assert result.json["effects"] == []
+    assert any("arm" in question["text"] for question in result.json["questions"])
+
+
+def test_a_report_is_not_written_over(respot, practice, tmp_path):
+    (tmp_path / "page.html").write_text("mine", encoding="utf-8")
+    result = fitted(respot, practice, "--report", "page.html")
+    assert result.code == 2
+    assert (tmp_path / "page.html").read_text(encoding="utf-8") == "mine"
+
+
+def test_repeats_tell_the_noise(respot, practice, tmp_path):
+    import random
+
+    dice = random.Random(4)
+    with (practice / "measured.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    with (tmp_path / "repeats.csv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(["id", "repeat", "x", "y", "z"])
+        for row in rows:
+            for number in (1, 2):
+                writer.writerow([row["id"], number, *(float(row[axis]) + dice.gauss(0.0, 0.05) for axis in "xyz")])
+    result = respot(
+        "fit", practice / "programmed.csv", "--measured", "repeats.csv", "--effects", "swapped_ids,scale", "--json"
+    )
+    assert result.code == 0, result.err
+    assert result.json["noise"]["source"] == "repeats"
+    assert 0.02 < result.json["noise"]["floor"] < 0.06
