@@ -3,47 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from respot.calibration import effects_model
 from respot.calibration.calibration import Calibration, Frame, Kind
-from respot.calibration.causes import Causes, Observe, Written, find_causes, names_of
+from respot.calibration.causes import Causes, Observe, Written, find_causes
 from respot.calibration.discovery.records import effects_of as discovered_effects
-from respot.calibration.effects import swapped_ids, tool_model, tool_offset
+from respot.calibration.effects import swapped_ids, tool_offset
+from respot.calibration.effects.effect import Effect
 from respot.calibration.effects.orientations import OrientationFit, compare_orientations
+from respot.calibration.effects.readings import reread
 from respot.calibration.effects.search import RIGID_ONLY, Effects
-from respot.calibration.effects.tool_fit import moved_by
-from respot.calibration.effects.tool_robust import fit_tool_robust
+from respot.calibration.final_model import FinalModel, final_model
 from respot.calibration.methods import affine_fit, paper_fit
-from respot.calibration.observations import Observations
-from respot.calibration.spot_fit import Method, SpotFit
-from respot.calibration.uncertainty import TransformUncertainty, transform_uncertainty, uncertainty_by_direction
+from respot.calibration.pairs import DEFAULT_FRAME, LEAST_PAIRS, Asked, Listed, PairedObserve, Pairs, pair_lists
+from respot.calibration.spot_fit import Method, Orientations, SpotFit, Weights
 from respot.kinematics.robot_file import robot_record
 from respot.registration.affine import fit_affine
 from respot.registration.alternatives import fit_translation
-from respot.registration.anisotropy import isotropy_p_value
-from respot.registration.congruence import congruence
 from respot.registration.errors import DegenerateError, RegistrationError
 from respot.registration.leave_one_out import leave_one_out
-from respot.registration.matching import IdMatch, Matching, match_by_name
-from respot.registration.pairing import Note, Pairing, pair_spots
+from respot.registration.matching import IdMatch, Matching
+from respot.registration.pairing import Note
 from respot.registration.rigid import RigidFit, check_pairs, fit_rigid
-from respot.registration.robust import RobustFit
 from respot.registration.statistics import residual_directions
 from respot.registration.support import rotation_support
 
 Array = NDArray[np.float64]
-PairedObserve = Callable[[Sequence[int] | NDArray[np.intp], Sequence[int] | NDArray[np.intp]], Observations]
 
-LEAST_PAIRS = 4
-DEFAULT_FRAME: Mapping[Kind, Frame] = {"theory": "same", "measured": "free"}
-LEAST_FOR_DIRECTIONS = 8
-"""Fewer residuals do not tell the noise of three directions."""
 LATERAL_NOISE = 3.0
 """Spots must stray from their best line by this many times the noise (RMS), or the turn about it is noise alone."""
 
@@ -71,6 +61,8 @@ def fit_tables(
     observe: PairedObserve | None = None,
     nested: bool = True,
     progress: Callable[[], None] = lambda: None,
+    weights: Weights = "even",
+    orientations: Orientations = "compare",
 ) -> SpotFit:
     """Pair two lists and fit them; parameters and errors as `fit_spots`.
 
@@ -96,43 +88,9 @@ def fit_tables(
     for which, ids, points in (("source", source_ids, source), ("reference", reference_ids, reference)):
         if np.shape(points) != (len(ids), 3):
             raise RegistrationError("SHAPE_MISMATCH", f"{which}: {len(ids)} names for points {np.shape(points)}")
-    first, second = np.asarray(source, dtype=np.float64), np.asarray(reference, dtype=np.float64)
-    same_frame = (frame or DEFAULT_FRAME[kind]) == "same"
-    looked_for = names_of(effects)
-
-    def pair(points: Array) -> Pairing:
-        return pair_spots(source_ids, points, reference_ids, second, way=matching, same_frame=same_frame, seed=seed)
-
-    pairing, doubt = None, None
-    try:
-        pairing = pair(first)
-        notes = pairing.notes
-        doubtful = any(note.code == "NOT_CONGRUENT" for note in notes)
-    except RegistrationError as error:
-        if error.code != "NOT_CONGRUENT":
-            raise
-        doubt, doubtful = error, True
-    if doubtful and tool_offset.NAME in looked_for and source_rotations is not None and method == "robust":
-        moved = _congruent_by_tool(source_ids, first, source_rotations, reference_ids, second, seed)
-        if moved is not None:
-            pairing = pair(moved)
-            message = (
-                "distances between spots agree with the reference after a constant offset in the tool frame and not "
-                "before: the poses are those of another TCP (the flange, or a wrong tool)"
-            )
-            notes = (*pairing.notes, Note("CONGRUENT_BY_TOOL", message))
-    if pairing is None:
-        assert doubt is not None  # noqa: S101 - without a pairing there was an error
-        raise doubt
-    match = pairing.match
-    fit = fit_spots(
-        match.ids,
-        first[match.source_rows],
-        second[match.reference_rows],
+    asked = Asked(
         kind=kind,
         frame=frame,
-        source_rotations=None if source_rotations is None else source_rotations[match.source_rows],
-        reference_rotations=None if reference_rotations is None else reference_rotations[match.reference_rows],
         noise=noise,
         noise_source=noise_source,
         seed=seed,
@@ -141,39 +99,19 @@ def fit_tables(
         n_min=n_min,
         effects=effects,
         provenance=provenance,
-        match=match,
-        notes=notes,
         written=written,
-        observe=None
-        if observe is None
-        else lambda permutation: observe(match.source_rows, match.reference_rows[permutation]),
         nested=nested,
         progress=progress,
+        weights=weights,
+        orientations=orientations,
     )
+    own = Listed(source_ids, np.asarray(source, dtype=np.float64), source_rotations)
+    other = Listed(reference_ids, np.asarray(reference, dtype=np.float64), reference_rotations)
+    pairs, doubt = pair_lists(own, other, asked, matching, observe)
+    fit = _fit(pairs, asked)
     if doubt is not None and not any(effect.name == tool_offset.NAME for effect in fit.effects):
         raise doubt
     return fit
-
-
-def _congruent_by_tool(
-    source_ids: Sequence[str],
-    source: Array,
-    rotations: Rotation,
-    reference_ids: Sequence[str],
-    reference: Array,
-    seed: int,
-) -> Array | None:
-    """Source spots (n, 3) moved by the tool offset under which the pairs by name are one body; None without any."""
-    match = match_by_name(source_ids, reference_ids)
-    first, second = source[match.source_rows], reference[match.reference_rows]
-    tools = rotations.as_matrix()
-    if len(first) < LEAST_PAIRS or not (np.isfinite(first).all() and np.isfinite(second).all()):
-        return None
-    try:
-        fit = fit_tool_robust(first, tools[match.source_rows], second, seed=seed)
-    except RegistrationError:
-        return None
-    return moved_by(source, tools, fit.offset) if congruence(fit.moved, second).same_body else None
 
 
 def fit_spots(
@@ -199,6 +137,8 @@ def fit_spots(
     observe: Observe | None = None,
     nested: bool = True,
     progress: Callable[[], None] = lambda: None,
+    weights: Weights = "even",
+    orientations: Orientations = "compare",
 ) -> SpotFit:
     """Fit paired spots: names, inliers, rigid transform, and how sure all of it is.
 
@@ -213,7 +153,8 @@ def fit_spots(
     source_rotations : Rotation of n, optional
         Tool orientations in the source frame.
     reference_rotations : Rotation of n, optional
-        Tool orientations in the reference frame. They are compared, and never move the fit.
+        Tool orientations in the reference frame. They are compared, and do not move the fit unless ``orientations``
+        says so.
     noise : float, optional
         Standard deviation per coordinate, known independently [mm].
     noise_source : str
@@ -243,52 +184,105 @@ def fit_spots(
         Also choose and fit without each fifth of the spots, to judge what is found by spots that took no part.
     progress : callable
         Called as the search for effects goes on.
+    weights : "even" or "direction"
+        Of the final rigid fit by the method "robust": a residual counts the same along all axes, or by the noise of its
+        direction (`respot.registration.anisotropy.fit_weighted`), which at least 7 inliers must tell. A model with
+        effects is fitted evenly, and a note says so.
+    orientations : "compare" or "fit"
+        Whether orientations are compared after the final rigid fit, or fitted with the positions
+        (`respot.registration.oriented.fit_rigid_oriented`); with effects as before. Names and inliers are those that
+        positions tell by themselves.
 
     Raises
     ------
     RegistrationError
         ``SHAPE_MISMATCH``, ``NOT_A_NUMBER``, ``TOO_FEW_PAIRS``, ``DUPLICATE_ID``; as `fit_paper` for the method
-        "paper"; ``COPLANAR_SPOTS`` for the method "affine"; ``BAD_OPTION`` for an unknown effect; ``NO_ORIENTATION``
-        or ``TOOL_NOT_DETERMINED`` where a tool offset is asked for and cannot be tried.
+        "paper"; ``COPLANAR_SPOTS`` for the method "affine"; ``BAD_OPTION`` for an unknown effect, and for weights or
+        orientations that do not go together, with the method, or with what the lists mean; ``NO_ORIENTATION``
+        or ``TOOL_NOT_DETERMINED`` where a tool offset, or a fit of orientations, is asked for and cannot be tried.
     DegenerateError
         ``COLLINEAR_SPOTS``: on a line, or off it by no more than `LATERAL_NOISE` times the noise.
     """
     names = tuple(str(name) for name in ids)
-    first, second = _check(names, source, reference)
-    causes = find_causes(
-        names,
-        first,
-        second,
-        source_rotations,
-        effects,
-        observe,
+    asked = Asked(
         kind=kind,
+        frame=frame,
         noise=noise,
+        noise_source=noise_source,
         seed=seed,
-        reference_rotations=reference_rotations,
+        method=method,
+        tau=tau,
+        n_min=n_min,
+        effects=effects,
+        provenance=provenance,
         written=written,
         nested=nested,
         progress=progress,
+        weights=weights,
+        orientations=orientations,
     )
-    repaired = second[causes.exchanged.permutation]
-    model = _model_of(causes, first, repaired, seed)
-    robust, moved, inliers = model.robust, model.moved, model.robust.inliers
-    _require_breadth(robust.rigid, model.uncertainty.sigma)
-    exchanged, trial = causes.exchanged, causes.trial
-    found = swapped_ids.effects_of(exchanged, names, second, kind=kind)
-    reading = causes.convention
-    if reading is not None and reading.finding is not None:
-        found = (*found, reading.finding.effect)
-    if trial is not None and trial.effect is not None:
-        found = (*found, trial.effect)
-    if causes.in_model is not None:
-        found = (*found, *discovered_effects(causes.in_model))
-    reference_names = names if match is None or not match.reference_ids else match.reference_ids
-    fit = SpotFit(
-        model=_calibration_of(causes, model, names, kind, frame, provenance),
-        match=match,
+    pairs = Pairs(
         ids=names,
-        reference_ids=tuple(reference_names[row] for row in exchanged.permutation),
+        source=np.asarray(source, dtype=np.float64),
+        reference=np.asarray(reference, dtype=np.float64),
+        source_rotations=source_rotations,
+        reference_rotations=reference_rotations,
+        match=match,
+        notes=notes,
+        observe=observe,
+    )
+    return _fit(pairs, asked)
+
+
+def _fit(pairs: Pairs, asked: Asked) -> SpotFit:
+    """Fit pairs by the method that was asked for."""
+    _check(pairs.ids, pairs.source, pairs.reference)
+    _require_sense(pairs, asked)
+    causes = find_causes(
+        pairs.ids,
+        pairs.source,
+        pairs.reference,
+        pairs.source_rotations,
+        asked.effects,
+        pairs.observe,
+        kind=asked.kind,
+        noise=asked.noise,
+        seed=asked.seed,
+        reference_rotations=pairs.reference_rotations,
+        written=asked.written,
+        nested=asked.nested,
+        progress=asked.progress,
+    )
+    repaired = pairs.reference[causes.exchanged.permutation]
+    turned = _read_again(pairs, causes)
+    if asked.orientations == "fit":
+        _require_same_tool(causes, turned, asked)
+    model = final_model(
+        causes,
+        pairs.source,
+        repaired,
+        turned,
+        weights=asked.weights,
+        orientations=asked.orientations,
+        seed=asked.seed,
+    )
+    _require_breadth(model.robust.rigid, model.uncertainty.sigma)
+    fit = _collected(pairs, asked, causes, model, repaired)
+    if asked.method == "paper":
+        return paper_fit(fit, tau=asked.tau, n_min=asked.n_min, seed=asked.seed)
+    return affine_fit(fit) if asked.method == "affine" else fit
+
+
+def _collected(pairs: Pairs, asked: Asked, causes: Causes, model: FinalModel, repaired: Array) -> SpotFit:
+    """Everything that was found, with the figures to compare it with."""
+    first, second, robust = pairs.source, pairs.reference, model.robust
+    inliers, exchanged = robust.inliers, causes.exchanged
+    named = pairs.ids if pairs.match is None or not pairs.match.reference_ids else pairs.match.reference_ids
+    return SpotFit(
+        model=_calibration_of(causes, model, pairs.ids, asked),
+        match=pairs.match,
+        ids=pairs.ids,
+        reference_ids=tuple(named[row] for row in exchanged.permutation),
         source=first,
         reference=repaired,
         source_rotations=causes.rotations,
@@ -299,79 +293,67 @@ def fit_spots(
         exchanged=exchanged,
         robust=robust,
         affine=fit_affine(first, second),
-        translation=fit_translation(moved[inliers], repaired[inliers]),
+        translation=fit_translation(model.moved[inliers], repaired[inliers]),
         directions=residual_directions(robust.rigid.residuals[inliers]),
-        support=rotation_support(moved[inliers], repaired[inliers]),
+        support=rotation_support(model.moved[inliers], repaired[inliers]),
         uncertainty=model.uncertainty,
-        effects=found,
-        noise=noise,
-        notes=notes if not model.has_tool else tuple(note for note in notes if note.code != "NOT_CONGRUENT"),
-        tool=trial,
-        orientations=_orientations(robust, source_rotations, reference_rotations, causes, written, kind),
-        convention=reading,
+        effects=_effects_of(pairs, asked, causes),
+        noise=asked.noise,
+        notes=_notes(pairs, asked, model),
+        tool=causes.trial,
+        orientations=_orientations(model, pairs, causes, asked),
+        convention=causes.convention,
         discovery=causes.discovery,
         observations=causes.observations,
-        noise_source=noise_source if noise is not None else None,
-        kind_of_search="all" if effects == "auto" else "some",
+        noise_source=asked.noise_source if asked.noise is not None else None,
+        kind_of_search="all" if asked.effects == "auto" else "some",
+        weighted=model.weighted,
+        oriented=model.oriented,
     )
-    if method == "paper":
-        return paper_fit(fit, tau=tau, n_min=n_min, seed=seed)
-    return affine_fit(fit) if method == "affine" else fit
 
 
-@dataclass(frozen=True, eq=False)
-class _Model:
-    """The final model of a fit, whatever effects are in it: the robust fit of the moved spots, and how sure it is."""
-
-    robust: RobustFit
-    moved: Array
-    rotations: Rotation | None
-    uncertainty: TransformUncertainty
-    left_out: Array
-    has_tool: bool
+def _effects_of(pairs: Pairs, asked: Asked, causes: Causes) -> tuple[Effect, ...]:
+    found = swapped_ids.effects_of(causes.exchanged, pairs.ids, pairs.reference, kind=asked.kind)
+    reading, trial = causes.convention, causes.trial
+    if reading is not None and reading.finding is not None:
+        found = (*found, reading.finding.effect)
+    if trial is not None and trial.effect is not None:
+        found = (*found, trial.effect)
+    return found if causes.in_model is None else (*found, *discovered_effects(causes.in_model))
 
 
-def _model_of(causes: Causes, source: Array, repaired: Array, seed: int) -> _Model:
-    rotations = causes.rotations
-    trial, joint = causes.trial, causes.in_model
-    if joint is not None:
-        robust = effects_model.robust_of(joint.fit, repaired)
-        calibrated = robust.rigid.predict(joint.fit.moved)
-        sure = effects_model.uncertainty_of(joint.fit, calibrated)
-        has_tool = any(term.effect == tool_offset.NAME for term in joint.fit.terms)
-        left_out = effects_model.left_out_of(joint.fit)
-        return _Model(robust, joint.fit.moved, joint.fit.rotations, sure, left_out, has_tool)
-    if trial is not None and trial.accepted and trial.fit is not None:
-        left = trial.fit.residuals if trial.left_out is None else trial.left_out
-        robust = tool_model.robust_of(trial.fit, repaired)
-        return _Model(robust, trial.fit.moved, rotations, tool_model.uncertainty_of(trial.fit), left, True)
-    robust = causes.exchanged.robust
-    inliers = robust.inliers
-    points, left = robust.rigid.predict(source)[inliers], robust.rigid.residuals[inliers]
-    uncertainty = transform_uncertainty(points, left)
-    if len(points) >= LEAST_FOR_DIRECTIONS:
-        alike = isotropy_p_value(source[inliers], repaired[inliers], seed=seed)
-        uncertainty = uncertainty_by_direction(uncertainty, points, left, alike)
-    return _Model(robust, source, rotations, uncertainty, leave_one_out(source, repaired, inliers), False)
+def _notes(pairs: Pairs, asked: Asked, model: FinalModel) -> tuple[Note, ...]:
+    notes = pairs.notes if not model.has_tool else tuple(note for note in pairs.notes if note.code != "NOT_CONGRUENT")
+    if asked.plain or model.weighted is not None or model.oriented is not None:
+        return notes
+    what = "weights by direction" if asked.weights == "direction" else "a fit of orientations"
+    message = f"{what} are for a rigid transform alone, and this model has effects: it is plain least squares"
+    return (*notes, Note("OPTION_UNUSED", message.replace("orientations are", "orientations is")))
 
 
-def _calibration_of(
-    causes: Causes,
-    model: _Model,
-    names: tuple[str, ...],
-    kind: Kind,
-    frame: Frame | None,
-    provenance: Mapping[str, Any] | None,
-) -> Calibration:
+def _read_again(pairs: Pairs, causes: Causes) -> Rotation | None:
+    """Tool orientations of the reference, in the order of the repaired names, read as a named convention has it."""
+    if pairs.reference_rotations is None:
+        return None
+    rotations = pairs.reference_rotations
+    finding = None if causes.convention is None else causes.convention.finding
+    if finding is not None and finding.side == "reference" and finding.effect.named:
+        rotations = reread(rotations, finding.reading)
+    return rotations[causes.exchanged.permutation]
+
+
+def _calibration_of(causes: Causes, model: FinalModel, names: tuple[str, ...], asked: Asked) -> Calibration:
     joint, trial = causes.in_model, causes.trial
     robot = causes.observations.robot if causes.observations is not None else None
+    how = {"weights": "direction"} if model.weighted is not None else {}
+    how |= {"orientations": "fit"} if model.oriented is not None else {}
     return Calibration(
         rotation=model.robust.rigid.rotation,
         translation=model.robust.rigid.translation,
-        kind=kind,
-        frame=frame or DEFAULT_FRAME[kind],
+        kind=asked.kind,
+        frame=asked.frame or DEFAULT_FRAME[asked.kind],
         ids=names,
-        provenance=dict(provenance or {}),
+        provenance={**dict(asked.provenance or {}), **how},
         tool_offset=trial.fit.offset if trial is not None and trial.accepted and trial.fit is not None else None,
         terms=() if joint is None else joint.fit.terms,
         values=() if joint is None else joint.fit.values,
@@ -379,26 +361,57 @@ def _calibration_of(
     )
 
 
-def _orientations(
-    robust: RobustFit,
-    source: Rotation | None,
-    reference: Rotation | None,
-    causes: Causes,
-    written: Written | None,
-    kind: Kind,
-) -> OrientationFit | None:
+def _orientations(model: FinalModel, pairs: Pairs, causes: Causes, asked: Asked) -> OrientationFit | None:
+    source, reference, written = pairs.source_rotations, pairs.reference_rotations, asked.written or Written()
     if source is None or reference is None:
         return None
-    rows = np.flatnonzero(robust.inliers)
+    rows = np.flatnonzero(model.robust.inliers)
     return compare_orientations(
-        robust.rigid.rotation,
+        model.robust.rigid.rotation,
         source[rows],
         reference[causes.exchanged.permutation[rows]],
-        kind=kind,
-        source_columns=(written.source if written else None) or "abc",
-        reference_columns=(written.reference if written else None) or "abc",
+        kind=asked.kind,
+        source_columns=written.source or "abc",
+        reference_columns=written.reference or "abc",
         finding=None if causes.convention is None else causes.convention.finding,
     )
+
+
+def _require_sense(pairs: Pairs, asked: Asked) -> None:
+    """Refuse options that do not go together, or with what the lists have."""
+    if asked.plain:
+        return
+    if asked.method != "robust":
+        message = (
+            f"weights and orientations are of our own rigid fit: the method {asked.method} has a transform of its own"
+        )
+        raise RegistrationError("BAD_OPTION", message)
+    if asked.orientations == "compare":
+        return
+    if asked.weights == "direction":
+        message = "weights by direction and a fit of orientations each make the transform: ask for one of them"
+        raise RegistrationError("BAD_OPTION", message)
+    for which, rotations in (("source", pairs.source_rotations), ("reference", pairs.reference_rotations)):
+        if rotations is None:
+            message = f"the {which} does not tell the orientation of the tool at every spot, and they are to be fitted"
+            raise RegistrationError("NO_ORIENTATION", message)
+
+
+def _require_same_tool(causes: Causes, turned: Rotation | None, asked: Asked) -> None:
+    """Refuse to fit orientations that do not mean the same tool directions, under the transform of the positions."""
+    robust, own, written = causes.exchanged.robust, causes.rotations, asked.written or Written()
+    assert own is not None and turned is not None  # noqa: S101 - asked before
+    rows = np.flatnonzero(robust.inliers)
+    found = compare_orientations(
+        robust.rigid.rotation,
+        own[rows],
+        turned[rows],
+        kind=asked.kind,
+        source_columns=written.source or "abc",
+        reference_columns=written.reference or "abc",
+    )
+    if found.code in ("ORIENTATIONS_DISAGREE", "ORIENTATION_CONVENTION"):
+        raise RegistrationError("BAD_OPTION", f"orientations cannot be fitted: {found.verdict}")
 
 
 def _check(names: tuple[str, ...], source: ArrayLike, reference: ArrayLike) -> tuple[Array, Array]:

@@ -84,6 +84,7 @@ def _report(fit: SpotFit) -> dict[str, Any]:
             "isotropy_p": fit.uncertainty.isotropy_p,
             "intervals_by_direction": fit.uncertainty.by_direction,
         },
+        "rigid_part": _rigid_part(fit),
         "effects": [effect.to_dict() for effect in fit.effects],
         **_search(fit),
         "orientations": None if fit.orientations is None else fit.orientations.to_dict(),
@@ -120,7 +121,9 @@ def _search(fit: SpotFit) -> dict[str, Any]:
 
 
 def _heldout(fit: SpotFit) -> dict[str, Any]:
-    """Errors of spots that took no part: each fifth left out of choosing and fitting, else one spot at a time."""
+    """Errors of spots that took no part: kept out from the start, else each fifth left out, else one at a time."""
+    if fit.heldout is not None:
+        return fit.heldout.to_dict()
     repaired = [name for name, changed in zip(fit.ids, fit.repaired, strict=True) if changed]
     found = fit.discovery
     if not fit.model.terms or found is None or found.nested is None or found.nested_folds is None:
@@ -139,6 +142,19 @@ def _heldout(fit: SpotFit) -> dict[str, Any]:
         "before": _statistics(before[judged]),
         "after": _statistics(found.nested[judged]),
         "repaired_ids": repaired,
+    }
+
+
+def _rigid_part(fit: SpotFit) -> dict[str, Any]:
+    """How the rigid part weighs what it was fitted to."""
+    weighted, oriented = fit.weighted, fit.oriented
+    return {
+        "weights": "even" if weighted is None else "direction",
+        "noise": None if weighted is None else weighted.noise.tolist(),
+        "orientations": "compare" if oriented is None else "fit",
+        "sigma_mm": None if oriented is None else oriented.sigma_mm,
+        "sigma_deg": None if oriented is None else oriented.sigma_deg,
+        "n_orientations": None if oriented is None else int(oriented.agree.sum()),
     }
 
 
@@ -204,7 +220,9 @@ def _affine_figures(fit: SpotFit, affine: AffineFit, rigid: dict[str, Any]) -> d
         "after": after,
         "after_all": after,
         "leave_one_out": {**rigid["leave_one_out"], "after": _number(rms(affine.leave_one_out))},
-        "heldout": {**rigid["heldout"], "after": _statistics(affine.leave_one_out), "repaired_ids": []},
+        "heldout": rigid["heldout"]
+        if fit.heldout is not None
+        else {**rigid["heldout"], "after": _statistics(affine.leave_one_out), "repaired_ids": []},
         "inlier_threshold": None,
         "spots": spots,
     }

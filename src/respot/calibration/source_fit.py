@@ -3,29 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from respot import __version__
 from respot.calibration.calibration import Frame, Kind
-from respot.calibration.causes import Written
-from respot.calibration.effects import tool_offset
+from respot.calibration.causes import Written, names_of
+from respot.calibration.effects import swapped_ids, tool_offset
 from respot.calibration.effects.readings import Columns
 from respot.calibration.effects.search import RIGID_ONLY, Effects
 from respot.calibration.effects.tool_fit import moved_by
 from respot.calibration.fit import fit_tables
+from respot.calibration.holdout import Split, judged, split_off
 from respot.calibration.prediction import table_of_joints
-from respot.calibration.repeats import noise_of_table
+from respot.calibration.repeats import noise_from_repeats
 from respot.calibration.source_observations import SourceObservations
-from respot.calibration.spot_fit import Method, SpotFit
+from respot.calibration.spot_fit import Method, Orientations, SpotFit, Weights
 from respot.calibration.stored import robot_identity
 from respot.issues import BadInputError, Issue
 from respot.kinematics.model import RobotModel
 from respot.registration.errors import RegistrationError
 from respot.registration.matching import Matching
 from respot.spots import Source, is_backup, read_source
+from respot.tables import Table, read_table
 
 #: Repeats tell the noise with this many degrees of freedom or more.
 _LEAST_REPEATS = 15
@@ -67,6 +70,12 @@ class FitOptions:
         Kinematics for a table's joints, or in the place of the backup's own.
     progress : callable
         Called as the search for effects goes on.
+    holdout : float or Path, optional
+        Share of the pairs, or a table of the spots, that take no part and are judged by the fit of the others.
+    weights : "even" or "direction"
+        Of the final rigid fit; see `respot.calibration.fit.fit_spots`.
+    orientations : "compare" or "fit"
+        Likewise.
     """
 
     kind: Kind = "theory"
@@ -83,6 +92,9 @@ class FitOptions:
     effects: Effects = RIGID_ONLY
     robot: RobotModel | None = None
     progress: Callable[[], None] = lambda: None
+    holdout: float | Path | None = None
+    weights: Weights = "even"
+    orientations: Orientations = "compare"
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,49 +126,81 @@ def fit_source(source_path: Path, reference_path: Path, options: FitOptions) -> 
         The source or reference cannot be used, or they do not determine a transform.
     """
     reference = read_source(reference_path, spot_id=options.spot_id, profiles=options.profiles)
-    source = _source_of(source_path, reference, options)
+    wanted = read_table(options.holdout, pose_needed=False) if isinstance(options.holdout, Path) else options.holdout
+    listed = [*reference.spots.ids, *(wanted.ids if isinstance(wanted, Table) else ())]
+    source = _source_of(source_path, listed, options)
     for side, path in ((source, source_path), (reference, reference_path)):
         if not side.spots.ids:
             detail = f": {side.spots.issues[0]}" if side.spots.issues else "; --spot-id REGEX tells how they are named"
             raise BadInputError("NO_COMMON_IDS", f"holds no weld spot that can be used{detail}", str(path))
+    split = split_off(source, reference, wanted, seed=options.seed, by_name=options.match != "geometry")
     observations = SourceObservations(source, reference, options.robot)
-    noise, noise_source = _noise_of(options, reference)
     try:
-        fit = fit_tables(
-            source.spots.ids,
-            source.spots.positions,
-            reference.spots.ids,
-            reference.spots.positions,
-            kind=options.kind,
-            frame=options.frame,
-            source_rotations=source.spots.rotations,
-            reference_rotations=reference.spots.rotations,
-            noise=noise,
-            noise_source=noise_source,
-            seed=options.seed,
-            method=options.method,
-            tau=options.tau,
-            n_min=options.n_min,
-            matching=options.match,
-            effects=options.effects,
-            written=Written(_columns_of(source), _columns_of(reference)),
-            observe=observations.of,
-            progress=options.progress,
-            provenance={
-                "version": __version__,
-                "source": str(source_path),
-                "source_sha256": source.sha256,
-                "reference": str(reference_path),
-                "reference_sha256": reference.sha256,
-                **({} if source.robot is None else {"robot": robot_identity(source.robot)}),
-            },
-        )
+        fit = _fit(source, reference, split, observations, options)
     except RegistrationError as error:
         raise BadInputError(error.code, _advice(error, source, reference), str(reference_path)) from error
-    issues = [*source.issues, *reference.issues, *_fit_issues(fit, source, reference)]
+    repair = swapped_ids.NAME in names_of(options.effects)
+    fit, found = judged(fit, split, source, observations, seed=options.seed, repair=repair)
+    issues = [*source.issues, *reference.issues, *_fit_issues(fit, source, reference), *found]
+    if isinstance(wanted, Table):
+        issues += wanted.issues
     if fit.discovery is not None:
         issues += [*observations.issues, *_effect_issues(fit, source)]
     return SourceFit(source, reference, fit, issues)
+
+
+def _fit(
+    source: Source, reference: Source, split: Split, observations: SourceObservations, options: FitOptions
+) -> SpotFit:
+    """Fit the spots that take part; rows and counts of the pairs are those of the whole lists."""
+    own, other = split.source_rows, split.reference_rows
+    noise, noise_source = _noise_of(options, reference, split)
+    fit = fit_tables(
+        [source.spots.ids[row] for row in own],
+        source.spots.positions[own],
+        [reference.spots.ids[row] for row in other],
+        reference.spots.positions[other],
+        kind=options.kind,
+        frame=options.frame,
+        source_rotations=None if source.spots.rotations is None else source.spots.rotations[own],
+        reference_rotations=None if reference.spots.rotations is None else reference.spots.rotations[other],
+        noise=noise,
+        noise_source=noise_source,
+        seed=options.seed,
+        method=options.method,
+        tau=options.tau,
+        n_min=options.n_min,
+        matching=options.match,
+        effects=options.effects,
+        written=Written(_columns_of(source), _columns_of(reference)),
+        observe=lambda rows, theirs: observations.of(own[rows], other[theirs]),
+        progress=options.progress,
+        provenance=_provenance(source, reference, split),
+        weights=options.weights,
+        orientations=options.orientations,
+    )
+    if not len(split) or fit.match is None:
+        return fit
+    match = replace(
+        fit.match,
+        source_rows=own[fit.match.source_rows],
+        reference_rows=other[fit.match.reference_rows],
+        n_source=len(source.spots.ids),
+        n_reference=len(reference.spots.ids),
+    )
+    return replace(fit, match=match, beside=None if fit.beside is None else replace(fit.beside, match=match))
+
+
+def _provenance(source: Source, reference: Source, split: Split) -> dict[str, Any]:
+    return {
+        "version": __version__,
+        "source": str(source.path),
+        "source_sha256": source.sha256,
+        "reference": str(reference.path),
+        "reference_sha256": reference.sha256,
+        **({} if source.robot is None else {"robot": robot_identity(source.robot)}),
+        **({"held_out": [source.spots.ids[row] for row in split.held_source]} if len(split) else {}),
+    }
 
 
 def _columns_of(source: Source) -> Columns | None:
@@ -166,21 +210,29 @@ def _columns_of(source: Source) -> Columns | None:
     return "quaternion" if "q1" in source.table.columns else "abc"
 
 
-def _source_of(path: Path, reference: Source, options: FitOptions) -> Source:
+def _source_of(path: Path, listed: Sequence[str], options: FitOptions) -> Source:
     """Read the source; a table of joints without positions by the named robot's flange."""
     if options.robot is not None and not is_backup(path):
         found, used = table_of_joints(path, options.robot)
         if used.code != "OPTION_UNUSED":
             return found
-    return read_source(path, reference.spots.ids, options.spot_id, options.robot_name, options.profiles)
+    return read_source(path, listed, options.spot_id, options.robot_name, options.profiles)
 
 
-def _noise_of(options: FitOptions, reference: Source) -> tuple[float | None, str]:
-    """Noise per coordinate that is known independently [mm], and where from: the user's word, else repeats."""
+def _noise_of(options: FitOptions, reference: Source, split: Split) -> tuple[float | None, str]:
+    """Noise per coordinate that is known independently [mm], and where from: the user's word, else repeats.
+
+    Repeats of spots that are held out do not count.
+    """
     if options.noise is not None:
         return options.noise, "--noise"
-    repeats = None if reference.table is None else noise_of_table(reference.table)
-    if repeats is None or repeats.sigma is None or repeats.degrees_of_freedom < _LEAST_REPEATS:
+    every = None if reference.table is None else reference.table.repeats
+    if every is None or every.positions is None:
+        return None, ""
+    held = {reference.spots.ids[row].casefold() for row in split.held_reference if row >= 0}
+    rows = [row for row, name in enumerate(every.ids) if name.casefold() not in held]
+    repeats = noise_from_repeats([every.ids[row] for row in rows], every.positions[rows])
+    if repeats.sigma is None or repeats.degrees_of_freedom < _LEAST_REPEATS:
         return None, ""
     return repeats.sigma_of_mean, "repeats"
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +19,10 @@ from respot.calibration.observations import Observations
 from respot.calibration.uncertainty import TransformUncertainty
 from respot.registration.affine import AffineFit
 from respot.registration.alternatives import TranslationFit
+from respot.registration.anisotropy import WeightedFit
 from respot.registration.exchanged import ExchangeResult
 from respot.registration.matching import IdMatch
+from respot.registration.oriented import OrientedFit
 from respot.registration.pairing import Note
 from respot.registration.paper import PaperFit
 from respot.registration.rigid import RigidFit
@@ -28,8 +30,15 @@ from respot.registration.robust import RobustFit
 from respot.registration.statistics import ResidualDirections
 from respot.registration.support import RotationSupport
 
+if TYPE_CHECKING:
+    from respot.calibration.holdout import HeldOutSpots
+
 Array = NDArray[np.float64]
 Method = Literal["robust", "paper", "affine"]
+Weights = Literal["even", "direction"]
+"""What a residual counts in the final rigid fit: the same along all axes, or by the noise of its direction."""
+Orientations = Literal["compare", "fit"]
+"""Tool orientations are compared after the fit, or fitted with the positions."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +103,12 @@ class SpotFit:
         Where ``noise`` is known from: ``"--noise"`` or ``"repeats"``.
     kind_of_search : "all" or "some"
         Whether all effects were looked for, or some by their names.
+    weighted : WeightedFit or None
+        The final rigid fit, where each direction was weighed by its own noise; ``robust.rigid`` is its transform.
+    oriented : OrientedFit or None
+        The final rigid fit of the inliers, where orientations were fitted with positions; likewise.
+    heldout : HeldOutSpots or None
+        Spots that were kept out of all of this from the start, and their errors.
     """
 
     model: Calibration
@@ -128,6 +143,9 @@ class SpotFit:
     convention: ConventionTrial | None = None
     noise_source: str | None = None
     kind_of_search: Literal["all", "some"] = "some"
+    weighted: WeightedFit | None = None
+    oriented: OrientedFit | None = None
+    heldout: HeldOutSpots | None = None
 
     @property
     def calibration(self) -> Calibration:

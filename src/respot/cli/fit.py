@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, TypedDict
 
 import typer
 
@@ -20,10 +20,17 @@ if TYPE_CHECKING:
     from respot.calibration.calibration import Kind
     from respot.calibration.effects.search import Effects
     from respot.calibration.source_fit import FitOptions
-    from respot.calibration.spot_fit import Method
+    from respot.calibration.spot_fit import Method, Orientations, Weights
     from respot.registration.matching import Matching
 
 HELP = "Fit the spots of a backup to a reference, say what is left and why."
+
+
+class RigidPart(TypedDict):
+    """Options of the rigid part."""
+
+    weights: Weights
+    orientations: Orientations
 
 
 def run(
@@ -38,6 +45,9 @@ def run(
     n_min: options.NMin = None,
     match: options.Match = "auto",
     effects: options.EffectsOption = "auto",
+    holdout: options.Holdout = None,
+    weights: options.WeightsOption = "even",
+    orientations: options.OrientationsOption = "compare",
     frame: options.FrameOption = None,
     robot: options.RobotModel = None,
     robot_name: options.RobotName = None,
@@ -56,7 +66,7 @@ def run(
     """Run the command."""
 
     def work() -> Outcome:
-        from respot.calibration.precision import with_precision
+        from respot.calibration.final_model import precise
         from respot.calibration.report import report
         from respot.calibration.source_fit import fit_source
         from respot.cli.progress import progress
@@ -67,12 +77,14 @@ def run(
         reference, chosen = reference_of(
             theory, measured, frame, robot_name, spot_id, noise, seed, method, tau, n_min, match
         )
+        chosen = replace(chosen, **rigid_part_of(method, weights, orientations), holdout=holdout_of(holdout))
         looked_for = effects_named(effects)
         if output is not None and method == "affine":
             message = "--method affine is for comparison only and makes no calibration to save: leave -o out"
             raise BadInputError("BAD_OPTION", message)
+        inputs = [source, reference, *([chosen.holdout] if isinstance(chosen.holdout, Path) else [])]
         for option, path in (("-o", output), ("--report", report_file)):
-            _check_free(path, option, (source, reference), force)
+            _check_free(path, option, inputs, force)
         model = None if robot is None else robot_of(robot)
         chosen = replace(chosen, profiles=tuple(profile or ()), effects=looked_for, robot=model)
         with progress("looking for effects", shown=looked_for != () and not as_json) as step:
@@ -80,7 +92,7 @@ def run(
         content_hash = None if method == "affine" else fitted.fit.calibration.content_hash
         data = {**report(fitted.fit), "calibration_hash": content_hash, "seed": seed}
         if output is not None:
-            _written(output, with_precision(fitted.fit).to_json())
+            _written(output, precise(fitted.fit).to_json())
         if report_file is not None:
             page = fit_page(
                 data,
@@ -107,7 +119,7 @@ def _check_free(path: Path | None, option: str, inputs: Sequence[Path], force: b
         message = f"exists; name another file with {option}, or replace it with --force"
         raise BadInputError("OUTPUT_EXISTS", message, str(path))
     if any(holds(read, path) for read in inputs):
-        message = f"lies in the source or the reference; name another file with {option}"
+        message = f"lies in what is read; name another file with {option}"
         raise BadInputError("OUTPUT_EXISTS", message, str(path))
 
 
@@ -116,6 +128,48 @@ def _written(path: Path, text: str) -> None:
         path.write_text(text, encoding="utf-8", newline="\n")
     except OSError as error:
         raise BadInputError("CANNOT_READ", f"cannot be written: {error.strerror}", str(path)) from error
+
+
+def holdout_of(text: str | None) -> float | Path | None:
+    """Read a fraction, or the name of a table.
+
+    Raises
+    ------
+    BadInputError
+        ``BAD_OPTION`` for what is neither.
+    """
+    if text is None:
+        return None
+    try:
+        return float(text)
+    except ValueError:
+        path = Path(text)
+    if not Path(text.rpartition("#")[0] or text).exists() and not path.exists():
+        message = f"--holdout is a share of the spots, above 0 and up to 0.5, or a spot table; {text!r} is neither"
+        raise BadInputError("BAD_OPTION", message)
+    return path
+
+
+def rigid_part_of(method: str, weights: str, orientations: str) -> RigidPart:
+    """Read how the rigid part weighs what it is fitted to.
+
+    Raises
+    ------
+    BadInputError
+        ``BAD_OPTION`` for an unknown word, or for words that do not go together.
+    """
+    all_weights: dict[str, Weights] = {"even": "even", "direction": "direction"}
+    if weights not in all_weights:
+        raise BadInputError("BAD_OPTION", f"--weights is even or direction, not {weights}")
+    ways: dict[str, Orientations] = {"compare": "compare", "fit": "fit"}
+    if orientations not in ways:
+        raise BadInputError("BAD_OPTION", f"--orientations is compare or fit, not {orientations}")
+    if method != "robust" and (weights, orientations) != ("even", "compare"):
+        message = f"--weights and --orientations belong to --method robust: {method} has a transform of its own"
+        raise BadInputError("BAD_OPTION", message)
+    if (weights, orientations) == ("direction", "fit"):
+        raise BadInputError("BAD_OPTION", "--weights direction and --orientations fit are two transforms: choose one")
+    return {"weights": all_weights[weights], "orientations": ways[orientations]}
 
 
 def effects_named(text: str) -> Effects:

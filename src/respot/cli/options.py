@@ -88,6 +88,31 @@ EffectsOption = Annotated[
         "swapped_ids,joint_zero.",
     ),
 ]
+Holdout = Annotated[
+    str | None,
+    typer.Option(
+        "--holdout",
+        metavar="FRACTION|TABLE",
+        help="Keep a share of the spots (0.2 is a fifth), or those of a spot table, out of everything, and say how "
+        "well the fit of the others predicts them.",
+        show_default=False,
+    ),
+]
+WeightsOption = Annotated[
+    str,
+    typer.Option(
+        "--weights",
+        help="Of a rigid fit: even, or direction (a residual counts by the noise of its direction, for noise that is "
+        "not the same along all axes).",
+    ),
+]
+OrientationsOption = Annotated[
+    str,
+    typer.Option(
+        "--orientations",
+        help="Tool orientations of both lists: compare (after the fit), or fit (with the positions, for a rigid fit).",
+    ),
+]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything that is drawn.")]
 Tolerance = Annotated[float, typer.Option("--tolerance", min=0.0, help="Tolerance of a spot, mm.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]

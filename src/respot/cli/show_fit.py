@@ -45,7 +45,8 @@ def show_fit(
     heading(f"{describe(fitted.source)} against {fitted.reference.path} (where it {kind})")
     matched = "geometry" if fit.match is not None and PLACE in fit.match.rules else "ID"
     counts = f"{len(fitted.source.spots.ids)} spots in the source, {len(fitted.reference.spots.ids)} in the reference"
-    line(f"{counts}, {len(fit.ids)} matched by {matched}, {int(fit.robust.inliers.sum())} inliers")
+    out = f", {len(fit.heldout.ids)} held out" if fit.heldout is not None else ""
+    line(f"{counts}{out}, {len(fit.ids)} matched by {matched}, {int(fit.robust.inliers.sum())} inliers")
     if fit.method == "affine":
         show_affine(fit)
     line()
@@ -108,6 +109,10 @@ def _show_errors(fit: SpotFit, tolerance: float) -> None:
     rigid, inliers = fit.robust.rigid.residuals, fit.robust.inliers
     kept = "names exchanged back" if fit.repaired.any() else "names as given"
     after = "the paper's transform" if fit.method == "paper" else "rigid"
+    if fit.weighted is not None:
+        after = "rigid, weighed by direction"
+    if fit.oriented is not None:
+        after = "rigid, orientations fitted too"
     if fit.model.tool_offset is not None:
         after = "rigid with a tool offset"
     if fit.model.terms:
@@ -119,6 +124,7 @@ def _show_errors(fit: SpotFit, tolerance: float) -> None:
         _errors("leave-one-out before", fit.before_loo),
         _errors("leave-one-out after", fit.after_loo),
         *_nested(fit),
+        *_heldout(fit),
         _errors("for comparison: translation alone", fit.translation.residuals),
     ]
     if fit.method == "paper" and fit.beside is not None:
@@ -135,6 +141,10 @@ def _show_errors(fit: SpotFit, tolerance: float) -> None:
     table([Column("", number=False), Column("RMS"), Column("mean"), Column("max"), Column("n")], rows)
     within = int((np.linalg.norm(rigid, axis=1) <= tolerance).sum())
     line(f"{within} of {len(fit.ids)} spots within {tolerance:g} mm after")
+    if fit.heldout is not None:
+        for name, other, repaired in zip(fit.heldout.ids, fit.heldout.reference_ids, fit.heldout.repaired, strict=True):
+            if repaired:
+                line(f"{name}, held out, lies at the place that the reference calls {other}, and is judged there")
 
 
 def _nested(fit: SpotFit) -> list[list[str]]:
@@ -144,6 +154,17 @@ def _nested(fit: SpotFit) -> list[list[str]]:
         return []
     judged = np.isfinite(found.nested).all(axis=1) & fit.robust.inliers
     return [_errors("each fifth left out of choosing and fitting", found.nested[judged])]
+
+
+def _heldout(fit: SpotFit) -> list[list[str]]:
+    """Errors of spots that were kept out from the start."""
+    if fit.heldout is None:
+        return []
+    after = "names exchanged back" if fit.heldout.repaired.any() else "names as given"
+    return [
+        _errors("held out before: rigid of the others, names as given", fit.heldout.before),
+        _errors(f"held out after: final model of the others, {after}", fit.heldout.after),
+    ]
 
 
 def _errors(title: str, vectors: Array) -> list[str]:
@@ -165,6 +186,15 @@ def _show_transform(fit: SpotFit) -> None:
     for name, value, width in zip("xyz", turned, half[3:], strict=True):
         line(f"  it turns about {name}         by {value:8.4f} +- {width:.4f} degrees")
     line(f"  {fit.support.verdict}")
+    if fit.oriented is not None:
+        part = fit.oriented
+        line(
+            f"  {int(part.agree.sum())} of {len(part.agree)} orientations took part: positions count by a noise of "
+            f"{part.sigma_mm:.3f} mm, orientations by {part.sigma_deg:.3f} degrees"
+        )
+    if fit.weighted is not None:
+        sd = np.sqrt(np.diag(fit.weighted.noise))
+        line(f"  residuals count by a noise of {sd[0]:.2f} / {sd[1]:.2f} / {sd[2]:.2f} mm in x / y / z")
 
 
 def _show_noise(fit: SpotFit) -> None:
