@@ -18,6 +18,7 @@ from respot.calibration.discovery.rivals import RivalTable, rival_table
 from respot.calibration.discovery.selection import Selection, State
 from respot.calibration.discovery.significance import DRAWS
 from respot.calibration.discovery.unexplained import Unexplained, unexplained
+from respot.calibration.effects import scale
 from respot.calibration.effects.catalogue import MECHANISMS, terms_of
 from respot.calibration.effects.moved import moved
 from respot.calibration.effects.term import Term
@@ -113,6 +114,7 @@ class _Search:
     step: Callable[[], None] = field(default=lambda: None)
 
     def rows(self, rows: NDArray[np.intp]) -> _Search:
+        """The same for some of the spots."""
         return replace(
             self,
             observations=self.observations.rows(rows),
@@ -235,11 +237,7 @@ def _settle(search: _Search, inliers: Mask, draws: int) -> _Found:
     for _ in range(_ROUNDS):
         rows = np.flatnonzero(inliers)
         even = None if found is None else evening(fit)
-        bank = Bank(search.terms, search.columns[rows], fit.moved[rows], even)
-        wanted = bank.project(bank.evened(fit.linear[rows]).ravel())
-        selection = Selection(
-            bank, wanted, search.noise, search.allowed, draws=draws, seed=search.seed, step=search.step
-        )
+        selection = _selection(search, fit, draws, even)
         start = () if found is None else found.state.chosen
         state = selection.search(start) if len(rows) >= LEAST_SPOTS else selection.state((), 0.0)
         chosen = tuple(sorted(state.chosen))
@@ -257,9 +255,16 @@ def _settle(search: _Search, inliers: Mask, draws: int) -> _Found:
     return found
 
 
+def _selection(search: _Search, fit: JointFit, draws: int, even: Array | None) -> Selection:
+    """Make a search among a fit's inliers, linear about it."""
+    rows = np.flatnonzero(fit.inliers)
+    bank = Bank(search.terms, search.columns[rows], fit.moved[rows], even)
+    wanted = bank.project(bank.evened(fit.linear[rows]).ravel())
+    return Selection(bank, wanted, search.noise, search.allowed, draws=draws, seed=search.seed, step=search.step)
+
+
 def _gated(search: _Search, found: _Found) -> _Found:
     """Leave out terms that do not help spots that were held out, by at least two ways to fold."""
-    rows = np.flatnonzero(found.fit.inliers)
     while found.state.chosen:
         folds = folds_of(search.observations)
         failing = []
@@ -279,16 +284,7 @@ def _gated(search: _Search, found: _Found) -> _Found:
         worst = min(failing)[1]
         chosen = tuple(i for i in found.state.chosen if i != worst)
         fit = fit_jointly(search.observations, search.reference, [search.terms[i] for i in chosen], found.fit.inliers)
-        bank = Bank(search.terms, search.columns[rows], fit.moved[rows], evening(fit))
-        selection = Selection(
-            bank,
-            bank.project(bank.evened(fit.linear[rows]).ravel()),
-            search.noise,
-            search.allowed,
-            draws=found.selection.draws,
-            seed=search.seed,
-            step=search.step,
-        )
+        selection = _selection(search, fit, found.selection.draws, evening(fit))
         found = _Found(selection, selection.state(chosen, found.fit.sigma), fit)
     return found
 
@@ -319,7 +315,12 @@ def _accepted(search: _Search, found: _Found, folds: dict[str, NDArray[np.intp]]
         )
         rest = selection.state([i for i in state.chosen if i != index], fit.sigma)
         made.append((rest.criterion - state.criterion, one))
-    return tuple(one for _, one in sorted(made, key=lambda pair: -pair[0]))
+    accepted = [one for _, one in sorted(made, key=lambda pair: -pair[0])]
+    # a body that changes its shape grows as well: how much of it is growth alike in all directions, nobody knows
+    shapes = tuple(one.term for one in accepted if MECHANISMS[one.term.effect].describes)
+    return tuple(
+        replace(one, aliases=(*one.aliases, *shapes)) if one.term.effect == scale.NAME else one for one in accepted
+    )
 
 
 def _tool_aliases(search: _Search, found: _Found, index: int) -> tuple[Term, ...]:
