@@ -297,8 +297,7 @@ def outside(seeds: range, verbose: bool) -> None:
             column = one.truth[0]["where"].get("column")
             right = [claim for claim in one.claims if column is not None and claim.where.get("column") == column]
             named = any(claim.named and claim not in right for claim in one.claims)
-            shape = any(claim.name == "deformation" for claim in one.claims)
-            totals[name].append((named, one.unexplained or bool(right) or shape))
+            totals[name].append((named, one.unexplained or bool(right)))
             if verbose and (named or not totals[name][-1][1]):
                 print(
                     f"    {dict(one.truth[0]['where'])} {one.truth[0]['left_rms']:.2f} s={one.sigma:.3f} "

@@ -175,6 +175,9 @@ def discover(
     accepted = _accepted(search, found, folds)
     left = unexplained(found.fit, observations, noise, seed)
     accepted = tuple(replace(each, named=_named(each, left, found.fit, noise)) for each in accepted)
+    if not left.present and any(MECHANISMS[each.term.effect].describes for each in accepted):
+        text = f"a smooth field over the part describes some of it, and what causes the field is not known; {left.text}"
+        left = replace(left, present=True, text=text)
     before = fit_jointly(observations, reference, (), found.fit.inliers)
     progress()
     labels = folds["mixed"]
