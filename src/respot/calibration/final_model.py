@@ -21,7 +21,12 @@ from respot.calibration.causes import Causes
 from respot.calibration.effects import tool_model, tool_offset
 from respot.calibration.precision import direction_share, with_precision
 from respot.calibration.spot_fit import Orientations, SpotFit, Weights
-from respot.calibration.uncertainty import TransformUncertainty, transform_uncertainty, uncertainty_by_direction
+from respot.calibration.uncertainty import (
+    LEAST_FOR_DIRECTIONS,
+    TransformUncertainty,
+    transform_uncertainty,
+    uncertainty_by_direction,
+)
 from respot.registration.anisotropy import WeightedFit, fit_weighted, isotropy_p_value
 from respot.registration.covariance import jacobian
 from respot.registration.errors import RegistrationError
@@ -32,8 +37,6 @@ from respot.registration.robust import RobustFit
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-LEAST_FOR_DIRECTIONS = 8
-"""Fewer residuals do not tell the noise of three directions."""
 LEAST_WEIGHED = 7
 """Inliers for weights by direction: what is left without one of them must still tell the noise."""
 MOST_REFITTED = 200
@@ -154,7 +157,7 @@ def _by_direction(plain: FinalModel, repaired: Array) -> FinalModel:
         degrees_of_freedom=weighted.degrees_of_freedom,
         half_width=weighted.half_width,
         isotropy_p=plain.uncertainty.isotropy_p,
-        by_direction=True,
+        by_direction=plain.uncertainty.by_direction,
     )
 
     def refit(others: Mask) -> tuple[Array, Array]:
@@ -206,7 +209,7 @@ def _oriented_uncertainty(
         half_width=fit.half_width,
         isotropy_p=plain.isotropy_p,
     )
-    if not plain.by_direction:
+    if len(residuals) < LEAST_FOR_DIRECTIONS or not residuals.any():
         return sure
     # the positions' part of the normal matrix, for their noise as it is; the orientations' part as it was
     noise = residuals.T @ residuals
@@ -217,7 +220,9 @@ def _oriented_uncertainty(
     covariance = fit.covariance @ spread @ fit.covariance * np.outer(_UNITS, _UNITS)
     free = len(residuals) - 2
     half = float(stats.t.ppf(0.975, free)) * np.sqrt(np.diag(covariance))
-    return replace(sure, covariance=covariance, degrees_of_freedom=free, half_width=half, by_direction=True)
+    return replace(
+        sure, covariance=covariance, degrees_of_freedom=free, half_width=half, by_direction=plain.by_direction
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,13 +32,15 @@ class TransformUncertainty:
     sigma : float
         Noise per coordinate, sqrt(SSR / (3n - 6)) [mm].
     degrees_of_freedom : int
-        3n - 6.
+        Of Student's t: 3n - 6 for one noise for all directions, n - 2 for one of each.
     half_width : (6,) array
         Half of each 95 % interval, by Student's t [mm, deg].
     isotropy_p : float or None
         Chance of residuals as uneven as these under noise that is the same along all axes; None where not asked for.
     by_direction : bool
-        The covariance takes the noise of each direction by itself; ``sigma`` stays the mean over the directions.
+        The residuals show that the noise is not the same along all axes. From `LEAST_FOR_DIRECTIONS` spots on the
+        covariance takes the noise of each direction by itself whether they do or not; ``sigma`` is the mean over the
+        directions.
     """
 
     covariance: Array
@@ -52,15 +54,22 @@ class TransformUncertainty:
 
 UNEVEN = 0.05
 """Below this chance the noise is taken not to be the same along all axes."""
+LEAST_FOR_DIRECTIONS = 6
+"""Fewer residuals do not tell the noise of three directions."""
 
 
 def uncertainty_by_direction(
     plain: TransformUncertainty, points: Array, residuals: Array, isotropy_p: float
 ) -> TransformUncertainty:
-    """Take the noise of each direction by itself, where the residuals show that it is not the same along all axes.
+    """Take the noise of each direction by itself.
 
     The transform is still plain least squares; its covariance is ``(J'J)^-1 J' S J (J'J)^-1`` with the covariance S of
-    one residual vector, and Student's t has n - 2 degrees of freedom.
+    one residual vector, and Student's t has n - 2 degrees of freedom. It does not wait for the residuals to show that
+    the noise is uneven, which few do: with noise of 0.5 / 4.9 / 1.7 mm the worst interval of the six holds in 86 to 91
+    % of simulated tables with 8 spots, in 81 to 89 % where a test at 5 % has the say, and in 70 to 74 % with one noise
+    for all. Of noise that is the same along all axes, clean and with bad spots in a box, the mean of the six is 95.0 to
+    95.8 % for 6 to 100 spots, the lowest 93.6 and the highest 96.9 %; they are 21 / 13 / 6 / 1 % wider than with one
+    noise for 6 / 8 / 14 / 100 spots. Along a flange with 6 spots they hold in 93 %.
 
     Parameters
     ----------
@@ -71,8 +80,6 @@ def uncertainty_by_direction(
     isotropy_p : float
         Of `respot.registration.anisotropy.isotropy_p_value`.
     """
-    if isotropy_p >= UNEVEN:
-        return replace(plain, isotropy_p=isotropy_p)
     free = len(points) - 2
     units = np.array([1.0, 1.0, 1.0, 180.0 / np.pi, 180.0 / np.pi, 180.0 / np.pi])
     covariance = plain_covariance(points, residuals.T @ residuals / free) * np.outer(units, units)
@@ -82,7 +89,7 @@ def uncertainty_by_direction(
         half_width=float(stats.t.ppf(0.975, free)) * np.sqrt(np.diag(covariance)),
         degrees_of_freedom=free,
         isotropy_p=isotropy_p,
-        by_direction=True,
+        by_direction=isotropy_p < UNEVEN,
     )
 
 
