@@ -18,7 +18,7 @@ from respot.calibration.discovery.rivals import RivalTable, rival_table
 from respot.calibration.discovery.selection import Selection, State
 from respot.calibration.discovery.significance import DRAWS
 from respot.calibration.discovery.unexplained import Unexplained, unexplained
-from respot.calibration.effects import scale
+from respot.calibration.effects import readback_lag, scale
 from respot.calibration.effects.catalogue import MECHANISMS, terms_of
 from respot.calibration.effects.moved import moved
 from respot.calibration.effects.term import Term
@@ -174,8 +174,9 @@ def discover(
     folds = folds_of(observations)
     accepted = _accepted(search, found, folds)
     left = unexplained(found.fit, observations, noise, seed)
-    accepted = tuple(replace(each, named=_named(each, left, found.fit, noise)) for each in accepted)
-    if not left.present and any(MECHANISMS[each.term.effect].describes for each in accepted):
+    shaped = any(MECHANISMS[each.term.effect].describes for each in accepted)
+    accepted = tuple(replace(each, named=_named(each, left, found.fit, noise, shaped)) for each in accepted)
+    if not left.present and shaped:
         text = f"a smooth field over the part describes some of it, and what causes the field is not known; {left.text}"
         left = replace(left, present=True, text=text)
     before = fit_jointly(observations, reference, (), found.fit.inliers)
@@ -344,8 +345,14 @@ def _tool_aliases(search: _Search, found: _Found, index: int) -> tuple[Term, ...
     return tuple(alike)
 
 
-def _named(one: Accepted, left: Unexplained, fit: JointFit, noise: float | None) -> bool:
-    """Whether an effect may be called the cause: floor reached, nothing left, rivals lose, all of it determined."""
+def _named(one: Accepted, left: Unexplained, fit: JointFit, noise: float | None, shaped: bool) -> bool:
+    """Whether an effect may be called the cause: floor reached, nothing left, rivals lose, plausible.
+
+    Beside a shape whose cause is not known, only what follows something that was written down: the rest may be part of
+    the same cause.
+    """
+    if shaped and not one.term.own and one.term.effect != readback_lag.NAME:
+        return False
     if noise is None or not left.reached or left.present or not _is_cause(one.term):
         return False
     priors = np.array([parameter.prior for parameter in one.term.parameters])
