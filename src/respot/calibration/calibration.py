@@ -19,6 +19,7 @@ from respot.calibration.effects.moved import missing, moved, unmoved
 from respot.calibration.effects.term import Term
 from respot.calibration.observations import Observations
 from respot.calibration.precision import Precision
+from respot.kinematics.robot_file import robot_from_record
 from respot.registration.rigid import homogeneous
 
 Array = NDArray[np.float64]
@@ -386,8 +387,11 @@ class Calibration:
                 precision=None if sure is None else Precision.from_dict(sure),
                 terms=tuple(_term(each) for each in effects),
                 values=tuple(np.array(each["values"], dtype=np.float64) for each in effects),
-                robot=record.get("robot"),
+                robot=None if record.get("robot") is None else dict(record["robot"]),
             )
+            schema, own = result._content()["schema"], result.content_hash
+            if result.robot is not None:
+                robot_from_record(result.robot)
             stated, kept = record["hash"], None if sure is None else record["precision_hash"]
         except KeyError as error:
             raise CalibrationError("CALIBRATION_INCOMPLETE", f"the calibration lacks the entry {error}") from error
@@ -397,11 +401,10 @@ class Calibration:
             raise CalibrationError(
                 "CALIBRATION_INCOMPLETE", f"an entry of the calibration is wrong: {error}"
             ) from error
-        schema = result._content()["schema"]
         if record["schema"] != schema:
             message = f"says schema {record['schema']!r}, but what it holds is {schema!r}: it was changed; fit it again"
             raise CalibrationError("CALIBRATION_SCHEMA", message)
-        if stated != result.content_hash or (result.precision and kept != _sha256(result.precision.to_dict())):
+        if stated != own or (result.precision and kept != _sha256(result.precision.to_dict())):
             raise CalibrationError(
                 "CALIBRATION_CHANGED",
                 "the calibration does not match the hash it carries: it was changed after it was saved; fit it again",

@@ -154,7 +154,7 @@ def _covariate(name: str, cells: Sequence[str], values: Array | None, constant: 
             return f"is the same everywhere ({filled[0]})"
         few = len(distinct) <= _MOST_NUMERIC_LEVELS and np.all(distinct == np.round(distinct))
         labels = (
-            tuple("" if not np.isfinite(v) else f"{v:g}" for v in values)
+            tuple("" if not np.isfinite(v) else f"{v:.0f}" for v in values)
             if few and role in ("group", "other")
             else None
         )

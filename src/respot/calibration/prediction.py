@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from respot.calibration.ball import SHARE, ball_radius
 from respot.calibration.calibration import Calibration, CalibrationError
 from respot.calibration.covariates import covariates_of
-from respot.calibration.effects.moved import missing
+from respot.calibration.effects.moved import beyond, missing
 from respot.calibration.observations import Observations
 from respot.calibration.source_observations import SourceObservations
 from respot.calibration.stored import load_calibration, source_issues
@@ -51,8 +51,8 @@ class Prediction:
     leverage : (n,) array or None
         Variance by the parameters, as a share of the noise's.
     extrapolated : (n,) bool array or None
-        Outside the hull of the fitted spots: there the model was never tested, and intervals only say what follows
-        from it.
+        Outside the hull of the fitted spots, or the range of what an effect follows: there the model was never tested,
+        and intervals only say what follows from it.
     """
 
     ids: tuple[str, ...]
@@ -138,7 +138,11 @@ def predict_spots(
     if not bootstrap:
         free = sure.degrees_of_freedom
         radii = ball_radius(covariance, free, share), ball_radius(covariance + sure.noise, free, share)
-    return Prediction(names, moved, turned, *radii, sure.leverage_of(covariance), sure.outside(given))
+    extrapolated = sure.outside(given)
+    if observations is not None:
+        for term in calibration.terms:
+            extrapolated = extrapolated | beyond(observations, term)
+    return Prediction(names, moved, turned, *radii, sure.leverage_of(covariance), extrapolated)
 
 
 def _columns_of(
@@ -348,7 +352,23 @@ def seen_by(
             "the intervals are as much wider"
         )
         issues.append(Issue("EFFECT_LEFT_OUT", message, str(source.path)))
-    return calibration.without(lacking), observations, [*gathered.issues, *issues]
+    used = calibration.without(lacking)
+    return used, observations, [*gathered.issues, *issues, *beyond_range(used, observations, source)]
+
+
+def beyond_range(calibration: Calibration, observations: Observations, source: Source) -> list[Issue]:
+    """One issue for each effect that is asked outside the range of what it follows."""
+    issues = []
+    for term in calibration.terms:
+        count = int(beyond(observations, term).sum())
+        if count:
+            message = (
+                f"{term.label} is used on {count} of {len(observations)} spots outside the range of "
+                f"{term.own or 'angles'} that it was fitted to: there it is a guess, and intervals only say what "
+                "follows from it"
+            )
+            issues.append(Issue("EXTRAPOLATED", message, str(source.path)))
+    return issues
 
 
 def _joined(observations: Observations, source: Source, table: Table) -> Observations:
@@ -378,7 +398,7 @@ def _unused(table: Table, source: Source) -> Issue:
 
 
 def extrapolated(prediction: Prediction) -> list[Issue]:
-    """One issue for all spots outside the hull of the fitted ones."""
+    """One issue for all spots outside the hull of the fitted ones, or the range of what effects follow."""
     if prediction.extrapolated is None or prediction.leverage is None or not prediction.extrapolated.any():
         return []
     rows = np.flatnonzero(prediction.extrapolated)
@@ -386,7 +406,7 @@ def extrapolated(prediction: Prediction) -> list[Issue]:
     more = f" and {len(names) - _MOST_LISTED} more" if len(names) > _MOST_LISTED else ""
     worst = int(rows[np.argmax(prediction.leverage[rows])])
     message = (
-        f"{len(names)} of {len(prediction.ids)} spots lie outside the hull of the fitted ones, where the model was "
+        f"{len(names)} of {len(prediction.ids)} spots lie outside of what was fitted, where the model was "
         f"never tested: {', '.join(names[:_MOST_LISTED])}{more}; the highest leverage is "
         f"{prediction.leverage[worst]:.2g} at {prediction.ids[worst]}"
     )

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from respot.calibration.calibration import Calibration, CalibrationError, Kind
 from respot.calibration.effects.moved import missing
 from respot.calibration.observations import Observations
-from respot.calibration.prediction import Prediction, UseOptions, extrapolated, predict_spots, read_for
+from respot.calibration.prediction import Prediction, UseOptions, beyond_range, extrapolated, predict_spots, read_for
 from respot.calibration.source_observations import SourceObservations
 from respot.calibration.stored import load_calibration
 from respot.issues import BadInputError, Issue
@@ -300,7 +300,8 @@ def _seen(
         )
         for term in lacking
     ]
-    return calibration.without(lacking), observations, [*gathered.issues, *issues]
+    used = calibration.without(lacking)
+    return used, observations, [*gathered.issues, *issues, *beyond_range(used, observations, source)]
 
 
 def _pair_issues(match: IdMatch, source: Source, reference: Source) -> list[Issue]:

@@ -35,6 +35,8 @@ def _terms(observations: Observations) -> list[Term]:
 def _numeric(observations: Observations, name: str, column: Covariate) -> list[Term]:
     assert column.values is not None  # noqa: S101 - asked for a number
     distinct = np.unique(column.values)
+    if len(distinct) < 2:  # of the pairs: the rest of the table may have others
+        return []
     start, span = float(distinct[0]), float(distinct[-1] - distinct[0])
     place = {"column": name}
     # an error that is alike everywhere is a tool offset's or the rigid part's, not the column's

@@ -19,7 +19,7 @@ def _terms(observations: Observations) -> list[Term]:
         return []
     found = []
     for name, column in observations.columns.items():
-        if column.role == "force" and column.values is not None:
+        if column.role == "force" and column.values is not None and np.ptp(column.values) > 0.0:
             form = {"full": float(np.abs(column.values).max())}
             one = (Parameter("z", "mm", PLAUSIBLE_MM),)
             found.append(Term(NAME, {"column": name}, one, {**form, "along": "z", "power": 1}, own=name))

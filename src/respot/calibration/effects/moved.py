@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from respot.calibration.effects import joint_profile
 from respot.calibration.effects.catalogue import MECHANISMS
 from respot.calibration.effects.term import Term
 from respot.calibration.observations import Observations
@@ -17,6 +18,8 @@ Array = NDArray[np.float64]
 
 _TURNS = 20
 _STILL_MM = 1e-10
+_NEAR = 1.2
+"""A term holds as far as this many half ranges from the middle of what it follows."""
 
 
 def moved(observations: Observations, terms: Sequence[Term], values: Sequence[Array]) -> tuple[Array, Rotation | None]:
@@ -56,19 +59,58 @@ def missing(observations: Observations, term: Term) -> str:
     """Say what observations lack that a term needs; empty if nothing."""
     mechanism = MECHANISMS[term.effect]
     column = str(term.where.get("column", ""))
-    if column and column not in observations.columns:
-        return f"the column {column}"
+    if column:
+        if column not in observations.columns:
+            return f"the column {column}"
+        groups = "level" in term.where or "levels" in term.form
+        known = observations.columns[column]
+        if (known.labels if groups else known.values) is None:
+            return f"the column {column} as {'groups' if groups else 'numbers'}"
     if mechanism.acts in ("joints", "arm") and not observations.has_arm:
         return "joints and a robot model"
     if (mechanism.acts == "tool" or term.form.get("frame") == "tool") and observations.rotations is None:
         return "the orientation of the tool"
-    if term.effect == "readback_lag" and observations.measured_joints is None:
-        return "measured joints"
-    if term.effect == "backlash" and observations.approach is None:
-        return f"the column {term.own}"
-    if term.effect == "rail" and observations.external_axes is None:
-        return "external axes"
+    if term.effect == "readback_lag":
+        measured, joints = observations.measured_joints, observations.joints
+        if measured is None or joints is None or measured.shape != joints.shape or not np.isfinite(measured).all():
+            return "measured joints"
+    if term.effect == "backlash":
+        signs = observations.approach
+        if signs is None or not np.isfinite(signs[:, term.where["axis"] - 1]).all():
+            return f"the column {term.own}"
+    if term.effect == "rail":
+        travel = observations.external_axes
+        if travel is None or not np.isfinite(travel[:, term.where["external_axis"] - 1]).all():
+            return f"external axis {term.where['external_axis']}"
     return ""
+
+
+def beyond(observations: Observations, term: Term) -> NDArray[np.bool_]:
+    """Which spots (n,) stand where a term was never seen: outside the range of what it follows, by a tenth of it."""
+    form = term.form
+    if "start" in form and "span" in form:
+        values, middle, half = _followed(observations, term), form["start"] + form["span"] / 2.0, form["span"] / 2.0
+    elif "full" in form:
+        values, middle, half = _followed(observations, term), 0.0, form["full"]
+    elif "external_axis" in term.where and observations.external_axes is not None:
+        values, middle, half = (
+            observations.external_axes[:, term.where["external_axis"] - 1],
+            form["middle"],
+            form["half"],
+        )
+    elif joint_profile.MIDDLE in form and observations.joints is not None:
+        values = observations.joints[:, term.where["axis"] - 1]
+        middle, half = form[joint_profile.MIDDLE], form[joint_profile.HALF]
+    else:
+        return np.zeros(len(observations), dtype=np.bool_)
+    if values is None:
+        return np.zeros(len(observations), dtype=np.bool_)
+    return np.asarray(np.abs(values - middle) > _NEAR * half)
+
+
+def _followed(observations: Observations, term: Term) -> Array | None:
+    column = observations.columns.get(str(term.where.get("column", "")))
+    return None if column is None else column.values
 
 
 def _through_arm(term: Term) -> bool:

@@ -17,6 +17,8 @@ _LEAST_DEG = 1e-6
 def _terms(observations: Observations) -> list[Term]:
     if not observations.has_arm or observations.measured_joints is None or observations.joints is None:
         return []
+    if observations.measured_joints.shape != observations.joints.shape:
+        return []
     apart = observations.measured_joints - observations.joints
     if not np.isfinite(apart).all():
         return []

@@ -18,7 +18,7 @@ def _terms(observations: Observations) -> list[Term]:
         return []
     found = []
     for name, column in observations.columns.items():
-        if column.role == "counter" and column.values is not None:
+        if column.role == "counter" and column.values is not None and np.ptp(column.values) > 0.0:
             form = {"full": float(np.abs(column.values).max())}
             even, bent = vector("", "mm", PLAUSIBLE_MM), vector("bend_", "mm", PLAUSIBLE_MM)
             found.append(Term(NAME, {"column": name}, even, {**form, "power": 1}, own=name))
