@@ -307,23 +307,32 @@ def _predicted(fit: SpotFit, split: Split, source: Source, observations: SourceO
 def _seen(
     model: Calibration, split: Split, source: Source, observations: SourceObservations
 ) -> list[tuple[Rows, Observations | None]]:
-    """What is known of the spots held out: by the table if it tells all that the effects need, else by the reference.
+    """What is known of the spots held out: by the table or by the reference, whichever tells more of what effects need.
 
     Without effects nothing needs to be known.
     """
     every = np.arange(len(split), dtype=np.intp)
     if not model.terms:
         return [(every, None)]
-    listed = split.held_reference >= 0
-    if split.table is None or split.held_table is None or split.table.xyz is None:
-        return [(every, observations.of(split.held_source, split.held_reference))]
-    told = Source(source.path, spots_of_table(split.table), split.table.sha256, table=split.table)
-    theirs = SourceObservations(source, told, observations.robot, constant=True).of(split.held_source, split.held_table)
-    if not listed.any() or not any(missing(theirs, term) for term in model.terms):
-        return [(every, theirs)]
-    rows, rest = np.flatnonzero(listed), np.flatnonzero(~listed)
-    known = observations.of(split.held_source[rows], split.held_reference[rows])
-    return [(rows, known), *([(rest, theirs.rows(rest))] if len(rest) else [])]
+    told = []
+    if split.table is not None and split.held_table is not None and split.table.xyz is not None:
+        side = Source(source.path, spots_of_table(split.table), split.table.sha256, table=split.table)
+        theirs = SourceObservations(source, side, observations.robot, constant=True)
+        told.append((theirs.of(split.held_source, split.held_table), every))
+    listed = np.flatnonzero(split.held_reference >= 0)
+    if len(listed):
+        told.append((observations.of(split.held_source[listed], split.held_reference[listed]), listed))
+
+    def lacks(seen: Observations) -> int:
+        return sum(bool(missing(seen, term)) for term in model.terms)
+
+    if len(told[0][1]) == len(every) and not lacks(told[0][0]):
+        return [(every, told[0][0])]
+    one_by_one: list[tuple[Rows, Observations | None]] = []
+    for row in every:
+        known = [seen.rows(np.flatnonzero(rows == row)) for seen, rows in told if row in rows]
+        one_by_one.append((np.array([row]), min(known, key=lacks)))
+    return one_by_one
 
 
 def _repaired(plain: HeldOutSpots, fit: SpotFit, predicted: Array, positions: Array, seed: int) -> HeldOutSpots:
