@@ -177,3 +177,19 @@ def test_an_effect_can_be_left_out(calibrated):
     assert [term.effect for term in bare.terms] == ["joint_zero"]
     blind = replace(seen.observations, columns={})
     bare.predict(blind.positions, blind.rotations, blind)
+
+
+@pytest.mark.parametrize("effect", ["group_shift", "drift", "warmup", "link_geometry"])
+def test_a_body_that_turns_takes_its_tools_along(effect):
+    """Two points of one tool move as the turned tool says."""
+    terms = [t for t in terms_of(SEEN) if t.effect == effect and len(t.parameters) % 6 == 0 and "known" not in t.form]
+    terms = terms or [t for t in terms_of(SEEN) if t.effect == effect and len(t.parameters) == 6]
+    term = terms[0]
+    dice = np.random.default_rng(2)
+    value = 1e-2 * dice.normal(size=len(term.parameters)) * np.array([p.prior for p in term.parameters])
+    tip = np.array([0.0, 0.0, 100.0])
+    points, rotations = moved(SEEN, [term], [value])
+    assert SEEN.rotations is not None and rotations is not None
+    ahead = replace(SEEN, positions=SEEN.positions + SEEN.rotations.apply(tip))
+    there, _ = moved(ahead, [term], [value])
+    assert np.abs(there - points - rotations.apply(tip)).max() < 1e-3

@@ -226,8 +226,9 @@ class Calibration:
     def without(self, left_out: Collection[Term]) -> Calibration:
         """Return the calibration without some of its effects: what they did not tell of is as where they are zero."""
         keep = [place for place, term in enumerate(self.terms) if term not in left_out]
-        stops = np.cumsum([0, *(len(value) for value in self.values)]) + 6
-        rows = [*range(6), *(row for place in keep for row in range(stops[place], stops[place + 1]))]
+        first = 6 if self.tool_offset is None else 9
+        stops = np.cumsum([0, *(len(value) for value in self.values)]) + first
+        rows = [*range(first), *(row for place in keep for row in range(stops[place], stops[place + 1]))]
         sure = self.precision
         if sure is not None:
             squares = [sure.effect_scatter[place] for place in range(len(self.terms)) if place not in keep]
@@ -235,6 +236,8 @@ class Calibration:
             scatter = tuple(sure.effect_scatter[place] for place in keep)
             cut = sure.covariance[np.ix_(rows, rows)]
             sure = replace(sure, covariance=cut, effect_scatter=scatter, unknown=unknown)
+            if squares:  # the promise was made with them
+                sure = replace(sure, heldout_rms=None, heldout_n=0)
         kept, values = tuple(self.terms[place] for place in keep), tuple(self.values[place] for place in keep)
         return replace(self, terms=kept, values=values, precision=sure)
 

@@ -224,6 +224,8 @@ class SourceObservations:
             )
             self._say("JOINTS_NOT_USED", message, path)
             return Observations(plain.positions, plain.rotations, external_axes=external)
+        if cell.track is None:
+            external = None  # the opening of a servo gun, or a positioner's: no rail
         self._approach = _approach(cell, robot, moves, joints)
         placed = cell if chains is None else standing(cell, chains)
         down = np.atleast_2d(gravity_in_base(placed))[0]

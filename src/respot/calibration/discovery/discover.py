@@ -12,7 +12,7 @@ from scipy import stats
 from respot.calibration.discovery.bank import Bank, columns_of
 from respot.calibration.discovery.evening import evening
 from respot.calibration.discovery.heldout import HeldOut, folds_of, heldout
-from respot.calibration.discovery.joint_fit import JointFit, fit_jointly
+from respot.calibration.discovery.joint_fit import SCALE_FLOOR, JointFit, fit_jointly
 from respot.calibration.discovery.outliers import misfit, settled
 from respot.calibration.discovery.rivals import RivalTable, rival_table
 from respot.calibration.discovery.selection import Selection, State
@@ -23,6 +23,7 @@ from respot.calibration.effects.catalogue import MECHANISMS, terms_of
 from respot.calibration.effects.moved import moved
 from respot.calibration.effects.term import Term
 from respot.calibration.observations import Observations
+from respot.registration.robust import fit_robust
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -237,20 +238,22 @@ def _settle(search: _Search, inliers: Mask, draws: int) -> _Found:
     """Search, fit, judge outliers by the model, and search again until nothing changes."""
     seen: set[tuple[bytes, tuple[int, ...]]] = set()
     fit = fit_jointly(search.observations, search.reference, (), inliers)
+    printing = fit.sigma <= SCALE_FLOOR  # what is finer than a micrometre has no cause
     found: _Found | None = None
     for _ in range(_ROUNDS):
         rows = np.flatnonzero(inliers)
-        even = None if found is None else evening(fit)
+        even = None if found is None else evening(fit.noise)
         selection = _selection(search, fit, draws, even)
         start = () if found is None else found.state.chosen
-        state = selection.search(start) if len(rows) >= LEAST_SPOTS else selection.state((), 0.0)
+        judged = len(rows) >= LEAST_SPOTS and not printing
+        state = selection.search(start) if judged else selection.state((), 0.0)
         chosen = tuple(sorted(state.chosen))
         fit = fit_jointly(search.observations, search.reference, [search.terms[i] for i in chosen], inliers)
         found = _Found(selection, selection.state(chosen, selection.sigma(state)), fit)
         inliers = settled(fit)
         key = (np.packbits(inliers).tobytes(), chosen)
         # once more where the noise turns out not to be alike along all axes
-        if key in seen and (even is not None) == (evening(fit) is not None):
+        if key in seen and (even is not None) == (fit.noise is not None):
             break
         seen.add(key)
         if not np.array_equal(inliers, fit.inliers):
@@ -281,14 +284,14 @@ def _gated(search: _Search, found: _Found) -> _Found:
             both = [scheme for scheme in one.rms if scheme in other.rms]
             gains = [other.rms[scheme] - one.rms[scheme] for scheme in both]
             better = sum(gain > 0.0 for gain in gains)
-            if better < min(2, len(both)) or (gains and sum(gains) <= 0.0):
+            if not gains or better < min(2, len(both)) or sum(gains) <= 0.0:
                 failing.append((sum(gains), index))
         if not failing:
             return found
         worst = min(failing)[1]
         chosen = tuple(i for i in found.state.chosen if i != worst)
         fit = fit_jointly(search.observations, search.reference, [search.terms[i] for i in chosen], found.fit.inliers)
-        selection = _selection(search, fit, found.selection.draws, evening(fit))
+        selection = _selection(search, fit, found.selection.draws, evening(fit.noise))
         found = _Found(selection, selection.state(chosen, found.fit.sigma), fit)
     return found
 
@@ -404,7 +407,11 @@ def _nested(search: _Search, inliers: Mask, labels: NDArray[np.intp], draws: int
         if len(rest) < LEAST_SPOTS:
             continue
         part = search.rows(rest)
-        found = _gated(part, _settle(part, inliers[rest], min(draws, _INNER_DRAWS)))
+        # what all spots together say of outliers is not known here
+        start = np.ones(len(rest), dtype=np.bool_)
+        if not inliers.all():
+            start = fit_robust(part.observations.positions, part.reference, seed=search.seed).inliers
+        found = _gated(part, _settle(part, start, min(draws, _INNER_DRAWS)))
         errors[out] = _errors(search, found.fit, out)
         search.step()
     return errors

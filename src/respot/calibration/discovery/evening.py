@@ -6,8 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from respot.calibration.discovery.joint_fit import JointFit
-
 Array = NDArray[np.float64]
 
 UNEVEN = 0.01
@@ -15,26 +13,32 @@ UNEVEN = 0.01
 _LEAST_SPOTS = 20
 
 
-def evening(fit: JointFit) -> Array | None:
-    """Matrix (3, 3) of the source frame under which what a fit leaves is alike along all axes; None where it is.
+def uneven_noise(left: Array, free: float) -> Array | None:
+    """Covariance (3, 3) of the noise of residuals that is not the same along all axes; None where it is [mm^2].
 
-    The root of the inverse covariance of the residuals, scaled so that their mean square stays. Mauchly's test of
-    sphericity (J. W. Mauchly, Ann. Math. Statist. 11 (1940)) says whether there is a difference.
+    Mauchly's test of sphericity (J. W. Mauchly, Ann. Math. Statist. 11 (1940)) says whether there is a difference.
 
     Parameters
     ----------
-    fit : JointFit
+    left : (m, 3) array
+        Residuals of a fit [mm].
+    free : float
+        Degrees of freedom of their sum of squares.
     """
-    left = fit.in_source[fit.inliers]
-    count = len(left) * fit.free / (3.0 * len(left))
     if len(left) < _LEAST_SPOTS:
         return None
-    covariance = left.T @ left / len(left)
-    values, vectors = np.linalg.eigh(covariance)
+    covariance: Array = 3.0 * left.T @ left / free
+    values = np.linalg.eigvalsh(covariance)
     mean = float(values.mean())
     if values[0] <= 1e-12 * mean:
         return None
-    statistic = -(count - 1.0 - 17.0 / 18.0) * float(np.sum(np.log(values / mean)))
-    if float(stats.chi2.sf(statistic, 5)) >= UNEVEN:
+    statistic = -(free / 3.0 - 1.0 - 17.0 / 18.0) * float(np.sum(np.log(values / mean)))
+    return None if float(stats.chi2.sf(statistic, 5)) >= UNEVEN else covariance
+
+
+def evening(covariance: Array | None) -> Array | None:
+    """Matrix (3, 3) under which noise of a covariance is alike along all axes, its mean square kept; None for None."""
+    if covariance is None:
         return None
-    return np.asarray((vectors * np.sqrt(mean / values)) @ vectors.T)
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray((vectors * np.sqrt(values.mean() / values)) @ vectors.T)

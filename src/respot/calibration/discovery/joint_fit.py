@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from respot.calibration.discovery.evening import uneven_noise
 from respot.calibration.effects.catalogue import MECHANISMS
 from respot.calibration.effects.moved import moved
 from respot.calibration.effects.term import Term
@@ -93,9 +94,25 @@ class JointFit:
         return np.asarray(np.linalg.pinv(self.normal, rcond=1e-13, hermitian=True), dtype=np.float64)
 
     @cached_property
+    def noise(self) -> Array | None:
+        """Covariance (3, 3) of the noise, source frame, where it is not the same along all axes; None where it is."""
+        return uneven_noise(self.in_source[self.inliers], self.free)
+
+    @cached_property
+    def _spread(self) -> Array:
+        """Covariance (6 + k, 6 + k) in units of the priors: of least squares under the noise as it is."""
+        if self.noise is None:
+            return np.asarray(self.sigma**2 * self.inverse)
+        rows = self.columns[self.inliers]
+        middle = np.einsum("nik,ij,njl->kl", rows, self.noise, rows, optimize=True) + self.sigma**2 * np.diag(
+            self.ridge
+        )
+        return np.asarray(self.inverse @ middle @ self.inverse)
+
+    @cached_property
     def value_sd(self) -> tuple[Array, ...]:
         """Standard deviations of each term's values, in their units."""
-        sd = self.sigma * np.sqrt(np.maximum(np.diag(self.inverse)[6:], 0.0)) * self.priors
+        sd = np.sqrt(np.maximum(np.diag(self._spread)[6:], 0.0)) * self.priors
         return split_by(sd, [len(value) for value in self.values])
 
     @cached_property
@@ -109,7 +126,7 @@ class JointFit:
         turn[:3, :3] = self.rotation
         turn[3:6, 3:6] = self.rotation * np.degrees(1.0 / self.extent)
         turn[6:, 6:] = np.diag(self.priors)
-        found = self.sigma**2 * turn @ self.inverse @ turn.T
+        found = turn @ self._spread @ turn.T
         return np.asarray((found + found.T) / 2.0)
 
     @property

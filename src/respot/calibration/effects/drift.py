@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from respot.calibration.effects.effect import Remedy
-from respot.calibration.effects.term import Mechanism, Parameter, Term, motion_about, vector
+from respot.calibration.effects.term import Mechanism, Parameter, Term, body_turns, motion_about, vector
 from respot.calibration.observations import Observations
 
 DRIFT, WARMUP = "drift", "warmup"
@@ -51,7 +51,8 @@ def _terms(observations: Observations, name: str) -> list[Term]:
     return found
 
 
-def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
+def _share(observations: Observations, term: Term) -> NDArray[np.float64]:
+    """How far the motion has come at each spot (n,): 1 at its end."""
     values = observations.columns[term.where["column"]].values
     assert values is not None  # noqa: S101 - the term was made of it
     elapsed = values - term.form["start"]
@@ -59,14 +60,33 @@ def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
         share = 1.0 - np.exp(-elapsed / term.form["time_constant"])
     else:
         share = elapsed / term.form["span"]
-    columns = motion_about(observations.positions, share, np.array(term.form["centre"]))
+    return np.asarray(share)
+
+
+def _slow(observations: Observations, term: Term) -> NDArray[np.float64]:
+    values = observations.columns[term.where["column"]].values
+    assert values is not None  # noqa: S101 - the term was made of it
+    return np.asarray(1.0 - np.exp(-(values - term.form["start"]) / term.form["second_time_constant"]))
+
+
+def _shares(observations: Observations, term: Term) -> list[NDArray[np.float64]]:
+    """What each half of the parameters follows, (n,) each."""
+    share = _share(observations, term)
     if "second_time_constant" in term.form:
-        slow = 1.0 - np.exp(-elapsed / term.form["second_time_constant"])
-        second = motion_about(observations.positions, slow, np.array(term.form["centre"]))
-        return np.concatenate([columns, second], axis=2)
-    if "power" in term.form:
-        return np.concatenate([columns, columns * share[:, None, None] ** (term.form["power"] - 1)], axis=2)
-    return columns[:, :, :3] if term.form["moves"] == "shift" else columns
+        return [share, _slow(observations, term)]
+    return [share, share ** term.form["power"]] if "power" in term.form else [share]
+
+
+def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
+    centre = np.array(term.form["centre"])
+    columns = [motion_about(observations.positions, share, centre) for share in _shares(observations, term)]
+    return columns[0][:, :, :3] if term.form["moves"] == "shift" else np.concatenate(columns, axis=2)
+
+
+def _turns(observations: Observations, term: Term) -> NDArray[np.float64]:
+    shares = _shares(observations, term)
+    size = len(term.parameters) // len(shares)
+    return np.concatenate([body_turns(share, size) for share in shares], axis=2)
 
 
 def _remedy(term: Term, values: NDArray[np.float64]) -> Remedy:
@@ -94,6 +114,7 @@ MECHANISMS = tuple(
         _remedy,
         needs="a column with the time",
         separates=_SEPARATES,
+        turns=_turns,
     )
     for name in (DRIFT, WARMUP)
 )

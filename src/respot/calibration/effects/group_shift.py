@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from respot.calibration.effects.effect import Remedy
-from respot.calibration.effects.term import Mechanism, Parameter, Term, motion_about, vector
+from respot.calibration.effects.term import Mechanism, Parameter, Term, body_turns, motion_about, vector
 from respot.calibration.observations import Observations
 
 NAME = "group_shift"
@@ -19,6 +19,7 @@ def level_terms(observations: Observations, effect: str, name: str) -> list[Term
     """Terms of each level of a column, as a shift and as a rigid motion, and of all levels at once."""
     column = observations.columns[name]
     levels = column.levels
+    seen = {"known": sorted({label for label in column.labels or () if label})}
     shift = vector("", "mm", PLAUSIBLE_MM)
     turn = tuple(Parameter(f"r{axis}", "deg", PLAUSIBLE_DEG) for axis in "xyz")
     found = []
@@ -26,12 +27,12 @@ def level_terms(observations: Observations, effect: str, name: str) -> list[Term
         share = column.of_level(level)
         centre = observations.positions[share > 0.0].mean(axis=0).tolist()
         place = {"column": name, "level": level}
-        found.append(Term(effect, place, shift, {"moves": "shift", "centre": centre}, own=name))
+        found.append(Term(effect, place, shift, {"moves": "shift", "centre": centre, **seen}, own=name))
         if share.sum() >= LEAST_FOR_TURN:
-            found.append(Term(effect, place, (*shift, *turn), {"moves": "body", "centre": centre}, own=name))
+            found.append(Term(effect, place, (*shift, *turn), {"moves": "body", "centre": centre, **seen}, own=name))
     if 2 < len(levels) <= _MOST_TOGETHER:
         names = tuple(p for level in levels[1:] for p in vector(f"{level}_", "mm", PLAUSIBLE_MM))
-        found.append(Term(effect, {"column": name}, names, {"levels": list(levels[1:])}, own=name))
+        found.append(Term(effect, {"column": name}, names, {"levels": list(levels[1:]), **seen}, own=name))
     return found
 
 
@@ -69,12 +70,20 @@ def _remedy(term: Term, values: NDArray[np.float64]) -> Remedy:
     return Remedy("base", text)
 
 
+def level_turns(observations: Observations, term: Term) -> NDArray[np.float64]:
+    """Rotation vectors of the tools of a level that turns as a body (n, 3, k) [deg per unit]."""
+    if "level" not in term.where:
+        return np.zeros((len(observations), 3, len(term.parameters)))
+    return body_turns(observations.columns[term.where["column"]].of_level(term.where["level"]), len(term.parameters))
+
+
 MECHANISM = Mechanism(
     NAME,
     "part",
     _terms,
     level_columns,
     _remedy,
+    turns=level_turns,
     needs="a column that names the group",
     separates="points of the group's own fixture, measured by themselves",
 )

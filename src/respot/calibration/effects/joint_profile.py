@@ -10,7 +10,7 @@ from respot.calibration.effects.term import Mechanism, Parameter, Term
 from respot.calibration.observations import Observations
 
 NAME = "joint_profile"
-PLAUSIBLE_DEG = 0.3
+PLAUSIBLE_DEG, PLAUSIBLE_MM = 0.3, 5.0
 MIDDLE, HALF = "middle_deg", "half_range_deg"
 _LEAST_RANGE = 10.0
 _WIDE = 100.0
@@ -22,19 +22,20 @@ def _terms(observations: Observations) -> list[Term]:
         return []
     assert observations.robot is not None and observations.joints is not None  # noqa: S101
     found = []
-    for axis in np.flatnonzero(observations.robot.revolute):
+    for axis, turns in enumerate(observations.robot.revolute):
         angles = observations.joints[:, axis]
         half = float(np.ptp(angles)) / 2.0
         if half < _LEAST_RANGE / 2.0:
             continue
         place = {"axis": int(axis) + 1}
+        unit = ("deg", PLAUSIBLE_DEG) if turns else ("mm", PLAUSIBLE_MM)
         # a constant of the last axis is a tool offset, and no spot tells the two apart
         least = 1 if axis == observations.robot.axes - 1 else 0
         own = {MIDDLE: float(angles.min()) + half, HALF: half}
         for power in (1, 2, 3, 4, 6):
-            names = tuple(Parameter(f"power_{n}", "deg", PLAUSIBLE_DEG) for n in range(least, power + 1))
+            names = tuple(Parameter(f"power_{n}", *unit) for n in range(least, power + 1))
             found.append(Term(NAME, place, names, {"powers": power, "least": least, **own}))
-        if 2.0 * half >= _WIDE:
+        if turns and 2.0 * half >= _WIDE:
             for harmonics in (1, 2, 4):
                 names = (
                     *(Parameter("power_0", "deg", PLAUSIBLE_DEG) for _ in range(1 - least)),

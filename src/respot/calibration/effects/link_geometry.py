@@ -45,6 +45,15 @@ def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:  # 
     return observations.link_columns[:, :, :-6]
 
 
+def _turns(observations: Observations, term: Term) -> NDArray[np.float64]:
+    assert observations.robot is not None and observations.joints is not None  # noqa: S101 - the term was made of them
+    frames, _ = observations.robot.frames(observations.joints)
+    found = np.zeros((len(observations), 3, len(term.parameters)))
+    for axis in range(observations.robot.axes - 1):
+        found[:, :, 6 * axis + 3 : 6 * axis + 6] = observations.in_source(frames[:, axis])
+    return found
+
+
 def _remedy(term: Term, values: NDArray[np.float64]) -> Remedy:  # noqa: ARG001
     text = (
         "Small errors all over the arm, as every robot has that is not calibrated for absolute accuracy. Correct the "
@@ -60,5 +69,6 @@ MECHANISM = Mechanism(
     _columns,
     _remedy,
     needs="joints",
+    turns=_turns,
     separates="many more spots, in several configurations of the arm",
 )

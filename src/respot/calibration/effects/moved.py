@@ -52,6 +52,9 @@ def moved(observations: Observations, terms: Sequence[Term], values: Sequence[Ar
         mechanism = MECHANISMS[term.effect]
         shift = mechanism.shifts(observations, term) @ value
         points = points + (turned.apply(shift) if turned is not None and mechanism.acts == "tool" else shift)
+        if mechanism.turns is not None and rotations is not None:
+            vectors = mechanism.turns(observations, term) @ value
+            rotations = Rotation.from_rotvec(vectors, degrees=True) * rotations
     return points, rotations
 
 
@@ -86,8 +89,12 @@ def missing(observations: Observations, term: Term) -> str:
 
 
 def beyond(observations: Observations, term: Term) -> NDArray[np.bool_]:
-    """Which spots (n,) stand where a term was never seen: outside the range of what it follows, by a tenth of it."""
+    """Which spots (n,) stand where a term was never seen: outside the range, or the groups, of what it follows."""
     form = term.form
+    if "known" in form:
+        column = observations.columns.get(str(term.where.get("column", "")))
+        labels = () if column is None or column.labels is None else column.labels
+        return np.array([label not in form["known"] for label in labels], dtype=np.bool_)
     if "start" in form and "span" in form:
         values, middle, half = _followed(observations, term), form["start"] + form["span"] / 2.0, form["span"] / 2.0
     elif "full" in form:

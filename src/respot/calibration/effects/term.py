@@ -127,6 +127,8 @@ class Mechanism:
         What the spots must come with.
     separates : str
         What measurement tells it from what it is confounded with.
+    turns : callable, optional
+        Of a term: by which rotation vector each tool turns, source frame, (n, 3, k) degrees per unit of each parameter.
     describes : bool
         It describes a shape and is no cause: it comes after all that may be one, and is never named.
     points : bool
@@ -140,6 +142,7 @@ class Mechanism:
     remedy: Callable[[Term, Array], Remedy]
     needs: str
     separates: str
+    turns: Callable[[Observations, Term], Array] | None = None
     describes: bool = False
     points: bool = False
 
@@ -149,6 +152,14 @@ class Mechanism:
         if self.acts == "joints":
             return np.asarray(observations.joint_columns @ columns)
         return columns
+
+
+def body_turns(values: Array, parameters: int) -> Array:
+    """Rotation vectors (n, 3, k) of columns that `motion_about` made, k a multiple of 6 or 3 [deg per unit]."""
+    found = np.zeros((len(values), 3, parameters))
+    for start in range(0, parameters - 5, 6):
+        found[:, :, start + 3 : start + 6] = along(values)
+    return found
 
 
 def along(values: Array, size: int = 3) -> Array:
