@@ -151,7 +151,7 @@ def _by_direction(plain: FinalModel, repaired: Array) -> FinalModel:
     weighted = fit_weighted(source, repaired, inliers)
     sigma = float(np.sqrt(np.mean(np.sum(weighted.residuals[inliers] ** 2, axis=1)) / 3.0))
     sure = TransformUncertainty(
-        covariance=weighted.covariance,
+        covariance=weighted.covariance * np.outer(_UNITS, _UNITS),
         centroid=weighted.centroid,
         sigma=sigma * float(np.sqrt(inliers.sum() / weighted.degrees_of_freedom)),
         degrees_of_freedom=weighted.degrees_of_freedom,
