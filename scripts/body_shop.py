@@ -37,6 +37,7 @@ from respot.calibration import effects_model
 from respot.calibration.discovery.discover import Accepted, Discovery, discover
 from respot.calibration.discovery.heldout import folds_of
 from respot.calibration.discovery.joint_fit import JointFit, fit_jointly
+from respot.calibration.effects.catalogue import terms_of
 from respot.calibration.effects.moved import moved
 from respot.calibration.effects.tool_fit import ToolFit, fit_tool, leave_one_out_tool
 from respot.calibration.observations import Observations
@@ -70,7 +71,7 @@ class Search:
     """What was looked at, and what was found: the tool by itself, and all effects."""
 
     observations: Observations
-    bare: Discovery
+    bare: JointFit
     found: Discovery
 
 
@@ -83,7 +84,7 @@ class Guess:
     """
 
     title: str
-    bare: Discovery
+    bare: JointFit
     found: Discovery
     fit: JointFit
     without: Array
@@ -160,25 +161,28 @@ def joints_of(robot: OpwRobot, poses: RigidTransform, branch: int) -> Array:
     return straight if np.abs(straight[:, 3]).max() <= np.abs(over[:, 3]).max() else over
 
 
-def at_tip(observations: Observations, found: Discovery) -> Observations:
-    """Observations of the tool's tip, by a tool offset that was found."""
-    tools = [value for term, value in zip(found.fit.terms, found.fit.values, strict=True) if term.effect in BARE]
-    if not tools or observations.rotations is None:
+def at_tip(observations: Observations, tool: JointFit) -> Observations:
+    """Observations of the tool's tip, by the tool alone."""
+    if observations.rotations is None:
         return observations
-    return replace(observations, positions=observations.positions + observations.rotations.apply(tools[0]))
+    return replace(observations, positions=observations.positions + observations.rotations.apply(tool.values[0]))
+
+
+def tool_alone(observations: Observations, reference: Array, inliers: NDArray[np.bool_]) -> JointFit:
+    """Rigid part and tool: as the search for the tool finds them, or of all spots where it refuses the tool."""
+    found = discover(observations, reference, inliers=inliers, effects=BARE, nested=False).fit
+    if found.terms:
+        return found
+    return fit_jointly(observations, reference, terms_of(observations, BARE), np.ones(len(reference), dtype=np.bool_))
 
 
 def searched(
     observations: Observations, reference: Array, inliers: NDArray[np.bool_], options: argparse.Namespace
 ) -> Search:
-    """Look for the tool, and for all effects; with ``--tool-first`` of the tip that the tool alone shows."""
-
-    def look(seen: Observations, effects: frozenset[str] | None) -> Discovery:
-        return discover(seen, reference, inliers=inliers, noise=options.noise, effects=effects, nested=False)
-
-    bare = look(observations, BARE)
+    """Look for all effects; with ``--tool-first`` of the tip that the tool alone shows."""
+    bare = tool_alone(observations, reference, inliers)
     seen = at_tip(observations, bare) if options.tool_first else observations
-    return Search(seen, bare, look(seen, None))
+    return Search(seen, bare, discover(seen, reference, inliers=inliers, noise=options.noise, nested=False))
 
 
 def guess(fit: SpotFit, candidate: Candidate | None, options: argparse.Namespace) -> Guess:
@@ -198,24 +202,23 @@ def guess(fit: SpotFit, candidate: Candidate | None, options: argparse.Namespace
         judged = observations.rows(out)
         without[out, 0] = errors(part.bare, judged, fit.reference[out])
         tip = at_tip(judged, part.bare) if options.tool_first else judged
-        without[out, 1] = errors(part.found, tip, fit.reference[out])
+        without[out, 1] = errors(part.found.fit, tip, fit.reference[out])
     return Guess(title, search.bare, search.found, complete(search, fit.reference), without)
 
 
-def errors(found: Discovery, observations: Observations, reference: Array) -> Array:
+def errors(fit: JointFit, observations: Observations, reference: Array) -> Array:
     """Distances (n,) of spots from where the model puts them [mm]."""
-    places, _ = moved(observations, found.fit.terms, found.fit.values)
-    apart = places @ found.fit.rotation.T + found.fit.translation - reference
+    places, _ = moved(observations, fit.terms, fit.values)
+    apart = places @ fit.rotation.T + fit.translation - reference
     return np.asarray(np.linalg.norm(apart, axis=1), dtype=np.float64)
 
 
 def complete(search: Search, reference: Array) -> JointFit:
-    """Fit what was found with the tool beside it, where the tip was taken for known."""
+    """Fit what was found with the tool beside it, where the tip was taken for known or the tool refused."""
     fit = search.found.fit
     if any(term.effect in BARE for term in fit.terms):
         return fit
-    tool = [term for term in search.bare.fit.terms if term.effect in BARE]
-    return fit_jointly(search.observations, reference, [*fit.terms, *tool], fit.inliers)
+    return fit_jointly(search.observations, reference, [*fit.terms, *search.bare.terms], fit.inliers)
 
 
 def leave_one_out(fit: JointFit) -> float:
@@ -238,7 +241,7 @@ def show(one: Guess) -> None:
     said = "; ".join(label(each) for each in found.accepted) or "nothing"
     out = int(np.count_nonzero(~found.fit.inliers))
     print(
-        f"  {one.title:24} {leave_one_out(one.bare.fit):7.3f} {leave_one_out(one.fit):7.3f} "
+        f"  {one.title:24} {leave_one_out(one.bare):7.3f} {leave_one_out(one.fit):7.3f} "
         f"{rms(one.without[:, :1]):8.3f} {rms(one.without[:, 1:]):7.3f} {out:4}  {said}",
         flush=True,
     )
@@ -259,7 +262,7 @@ def conclude(some: Sequence[Guess]) -> None:
     allowed = [name for name in sorted(set().union(*possible)) if all(name in names for names in possible)]
     others = [f"{name} ({sum(name in names for names in found)})" for name in every if name not in common]
     named = sum(each.named for one in some for each in one.found.accepted)
-    better = sum(leave_one_out(one.fit) < leave_one_out(one.bare.fit) for one in some)
+    better = sum(leave_one_out(one.fit) < leave_one_out(one.bare) for one in some)
     print(f"  {len(some)} robots; all find: {', '.join(common) or 'nothing in common'}")
     print(f"  found, or not separated from what is found, with all: {', '.join(allowed) or 'nothing'}")
     print(f"  depends on the robot (with how many): {', '.join(others) or 'nothing'}")

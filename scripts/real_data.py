@@ -32,6 +32,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from respot.calibration.discovery.discover import Accepted, Discovery, discover
+from respot.calibration.discovery.joint_fit import JointFit, fit_jointly
+from respot.calibration.effects.catalogue import terms_of
 from respot.calibration.effects.moved import moved
 from respot.calibration.observations import Observations
 from respot.calibration.prediction import table_of_joints
@@ -118,20 +120,26 @@ def searched(observations: Observations, reference: Array, effects: frozenset[st
     return discover(observations, reference, inliers=start, effects=effects, nested=False)
 
 
-def errors(found: Discovery, observations: Observations, reference: Array) -> Array:
+def tool_alone(observations: Observations, reference: Array) -> JointFit:
+    """Base and tool: as the search for the tool finds them, or of all rows where it refuses the tool."""
+    found = searched(observations, reference, BARE).fit
+    if found.terms:
+        return found
+    return fit_jointly(observations, reference, terms_of(observations, BARE), np.ones(len(reference), dtype=np.bool_))
+
+
+def errors(fit: JointFit, observations: Observations, reference: Array) -> Array:
     """Distances (n,) of spots from where the model puts them [mm]."""
-    places, _ = moved(observations, found.fit.terms, found.fit.values)
-    return np.asarray(
-        np.linalg.norm(places @ found.fit.rotation.T + found.fit.translation - reference, axis=1), dtype=np.float64
-    )
+    places, _ = moved(observations, fit.terms, fit.values)
+    apart = places @ fit.rotation.T + fit.translation - reference
+    return np.asarray(np.linalg.norm(apart, axis=1), dtype=np.float64)
 
 
-def at_tip(observations: Observations, found: Discovery) -> Observations:
-    """Observations of the tool's tip, by a tool offset that was found."""
-    tools = [value for term, value in zip(found.fit.terms, found.fit.values, strict=True) if term.effect in BARE]
-    if not tools or observations.rotations is None:
+def at_tip(observations: Observations, tool: JointFit) -> Observations:
+    """Observations of the tool's tip, by base and tool alone."""
+    if observations.rotations is None:
         return observations
-    return replace(observations, positions=observations.positions + observations.rotations.apply(tools[0]))
+    return replace(observations, positions=observations.positions + observations.rotations.apply(tool.values[0]))
 
 
 def trial(record: Record, title: str, out: Rows, effects: frozenset[str] | None, tool_first: bool = False) -> Trial:
@@ -139,14 +147,14 @@ def trial(record: Record, title: str, out: Rows, effects: frozenset[str] | None,
     rest = np.setdiff1d(np.arange(len(record.reference)), out)
     fit_on, judged_on = record.observations.rows(rest), record.observations.rows(out)
     known, hidden = record.reference[rest], record.reference[out]
-    first = searched(fit_on, known, BARE)
+    first = tool_alone(fit_on, known)
     bare = errors(first, judged_on, hidden)
     if tool_first:
         fit_on, judged_on = at_tip(fit_on, first), at_tip(judged_on, first)
     begin = time.process_time()
     found = searched(fit_on, known, effects)
     seconds = time.process_time() - begin
-    return Trial(title, len(rest), bare, errors(found, judged_on, hidden), found, seconds)
+    return Trial(title, len(rest), bare, errors(found.fit, judged_on, hidden), found, seconds)
 
 
 def short(each: Accepted) -> str:
