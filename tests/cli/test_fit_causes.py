@@ -138,3 +138,36 @@ def test_repeats_tell_the_noise(respot, practice, tmp_path):
     assert result.code == 0, result.err
     assert result.json["noise"]["source"] == "repeats"
     assert 0.02 < result.json["noise"]["floor"] < 0.06
+
+
+def test_a_source_in_another_convention_is_said_and_not_kept(respot, tmp_path):
+    """What is fitted to orientations as they are meant would be used on them as they are written."""
+    import numpy as np
+    from scipy.spatial.transform import Rotation
+
+    dice = np.random.default_rng(8)
+    points = dice.uniform(-500.0, 500.0, (24, 3)) + [1500.0, 0.0, 800.0]
+    tools = Rotation.from_euler("ZYX", dice.uniform(-60.0, 60.0, (24, 3)), degrees=True)
+    turn = Rotation.from_euler("ZYX", [20.0, 5.0, -8.0], degrees=True)
+    there, seen = turn.apply(points) + [100.0, 50.0, 20.0], turn * tools
+
+    def write(name, places, angles):
+        with (tmp_path / name).open("w", encoding="utf-8", newline="") as file:
+            writer = csv.writer(file)
+            writer.writerow(["id", "x", "y", "z", "a", "b", "c"])
+            for number, row in enumerate(np.hstack([places, angles])):
+                writer.writerow([f"S{number}", *(f"{value:.4f}" for value in row)])
+
+    moving = tools.as_euler("XYZ", degrees=True)[:, ::-1]  # C, B, A of moving x, y, z in the columns a, b, c
+    write("poses.csv", points, moving)
+    write("tracker.csv", there + dice.normal(size=(24, 3)) * 0.05, seen.as_euler("ZYX", degrees=True))
+    arguments = ["fit", "poses.csv", "--measured", "tracker.csv", "--effects", "convention,tool_offset"]
+    result = respot(*arguments, "--json")
+    assert result.code == 0, result.err
+    assert [effect["name"] for effect in result.json["effects"]] == ["convention"]
+    assert result.json["effects"][0]["where"]["list"] == "source"
+    assert result.json["effects"][0]["named"]
+    refused = respot(*arguments, "-o", "cal.json")
+    assert refused.code == 2
+    assert "convention" in refused.err
+    assert not (tmp_path / "cal.json").exists()

@@ -187,6 +187,12 @@ class SpotFit:
         return self.tool.fit.moved
 
     @property
+    def rereads_source(self) -> bool:
+        """Whether the source's orientations are taken for another convention than they were read in."""
+        found = None if self.convention is None else self.convention.finding
+        return found is not None and found.side == "source" and found.effect.named
+
+    @property
     def calibrated_rotations(self) -> Rotation | None:
         """Tool orientations under the final model, reference frame; None where the source has none."""
         turned = self.source_rotations

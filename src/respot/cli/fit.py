@@ -92,6 +92,13 @@ def run(
         content_hash = None if method == "affine" else fitted.fit.calibration.content_hash
         data = {**report(fitted.fit), "calibration_hash": content_hash, "seed": seed}
         if output is not None:
+            if fitted.fit.rereads_source:
+                message = (
+                    "its orientations are written in another convention than they are read in, and the calibration is "
+                    "fitted to them as they are meant: write the list anew (the message of the effect convention says "
+                    "how), then fit and save"
+                )
+                raise BadInputError("BAD_OPTION", message, str(source))
             _written(output, precise(fitted.fit).to_json())
         if report_file is not None:
             page = fit_page(
