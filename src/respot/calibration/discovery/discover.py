@@ -13,7 +13,7 @@ from respot.calibration.discovery.bank import Bank, columns_of
 from respot.calibration.discovery.evening import evening
 from respot.calibration.discovery.heldout import HeldOut, folds_of, heldout
 from respot.calibration.discovery.joint_fit import SCALE_FLOOR, JointFit, fit_jointly
-from respot.calibration.discovery.outliers import misfit, settled
+from respot.calibration.discovery.outliers import judged, misfit, settled
 from respot.calibration.discovery.rivals import RivalTable, rival_table
 from respot.calibration.discovery.selection import Selection, State
 from respot.calibration.discovery.significance import DRAWS
@@ -284,7 +284,9 @@ def _gated(search: _Search, found: _Found) -> _Found:
             both = [scheme for scheme in one.rms if scheme in other.rms]
             gains = [other.rms[scheme] - one.rms[scheme] for scheme in both]
             better = sum(gain > 0.0 for gain in gains)
-            if not gains or better < min(2, len(both)) or sum(gains) <= 0.0:
+            if not gains:  # no way to fold is fair to it: each spot by all others is
+                gains, better = [_one_by_one(bare) - _one_by_one(found.fit)], 2
+            if better < min(2, len(both)) or sum(gains) <= 0.0:
                 failing.append((sum(gains), index))
         if not failing:
             return found
@@ -294,6 +296,12 @@ def _gated(search: _Search, found: _Found) -> _Found:
         selection = _selection(search, fit, found.selection.draws, evening(fit.noise))
         found = _Found(selection, selection.state(chosen, found.fit.sigma), fit)
     return found
+
+
+def _one_by_one(fit: JointFit) -> float:
+    """RMS of the errors of single spots, each left out [mm]."""
+    errors = judged(fit)[0][fit.inliers]
+    return float(np.sqrt(np.mean(np.sum(errors**2, axis=1))))
 
 
 def _skipped(observations: Observations, term: Term) -> frozenset[str]:
@@ -365,7 +373,7 @@ def _named(one: Accepted, left: Unexplained, fit: JointFit, noise: float | None,
 
 def _is_cause(term: Term) -> bool:
     mechanism = MECHANISMS[term.effect]
-    return not (mechanism.describes or mechanism.points)
+    return not (mechanism.describes or mechanism.points or mechanism.many)
 
 
 def _tried(found: _Found) -> tuple[tuple[Term, float, float], ...]:

@@ -70,5 +70,6 @@ MECHANISM = Mechanism(
     _remedy,
     needs="joints",
     turns=_turns,
+    many=True,
     separates="many more spots, in several configurations of the arm",
 )

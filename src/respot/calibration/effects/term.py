@@ -133,6 +133,8 @@ class Mechanism:
         It describes a shape and is no cause: it comes after all that may be one, and is never named.
     points : bool
         It tells where to look for the cause and is none itself: it is never named.
+    many : bool
+        It has so many parameters that it comes near to almost any noise: it is never named.
     """
 
     name: str
@@ -145,6 +147,7 @@ class Mechanism:
     turns: Callable[[Observations, Term], Array] | None = None
     describes: bool = False
     points: bool = False
+    many: bool = False
 
     def shifts(self, observations: Observations, term: Term) -> Array:
         """Shifts of the TCP (n, 3, k) in the source frame per unit of each parameter [mm], to first order."""
