@@ -18,7 +18,7 @@ from respot.calibration.discovery.rivals import RivalTable, rival_table
 from respot.calibration.discovery.selection import Selection, State
 from respot.calibration.discovery.significance import DRAWS
 from respot.calibration.discovery.unexplained import Unexplained, unexplained
-from respot.calibration.effects import readback_lag, scale
+from respot.calibration.effects import link_geometry, readback_lag, scale, tool_shift
 from respot.calibration.effects.catalogue import MECHANISMS, terms_of
 from respot.calibration.effects.moved import moved
 from respot.calibration.effects.term import Term
@@ -331,11 +331,12 @@ def _accepted(search: _Search, found: _Found, folds: dict[str, NDArray[np.intp]]
         rest = selection.state([i for i in state.chosen if i != index], fit.sigma)
         made.append((rest.criterion - state.criterion, one))
     accepted = [one for _, one in sorted(made, key=lambda pair: -pair[0])]
-    # a body that changes its shape grows as well: how much of it is growth alike in all directions, nobody knows
+    # a body that changes its shape grows as well, and of links that are all off the last one's errors are a tool
+    # offset: how much of it is which, nobody knows
     shapes = tuple(one.term for one in accepted if MECHANISMS[one.term.effect].describes)
-    return tuple(
-        replace(one, aliases=(*one.aliases, *shapes)) if one.term.effect == scale.NAME else one for one in accepted
-    )
+    links = tuple(one.term for one in accepted if one.term.effect == link_geometry.NAME)
+    beside = {scale.NAME: shapes, tool_shift.NAME: links}
+    return tuple(replace(one, aliases=(*one.aliases, *beside.get(one.term.effect, ()))) for one in accepted)
 
 
 def _tool_aliases(search: _Search, found: _Found, index: int) -> tuple[Term, ...]:
