@@ -39,7 +39,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from respot.calibration.uncertainty import TransformUncertainty, transform_uncertainty, uncertainty_by_direction
+from respot.calibration.uncertainty import (
+    LEAST_FOR_DIRECTIONS,
+    TransformUncertainty,
+    transform_uncertainty,
+    uncertainty_by_direction,
+)
 from respot.registration.anisotropy import fit_weighted, isotropy_p_value, plain_covariance
 from respot.registration.covariance import unit_covariance
 from respot.registration.exchanged import ExchangeResult, find_exchanged
@@ -165,7 +170,10 @@ def _within(
     table: Table, inliers: NDArray[np.bool_], rotation: Array, translation: Array, names: NDArray[np.intp]
 ) -> NDArray[np.bool_]:
     points = table.source @ rotation.T + translation
-    known = transform_uncertainty(points[inliers], (points - table.reference[names])[inliers])
+    left = (points - table.reference[names])[inliers]
+    known = transform_uncertainty(points[inliers], left)
+    if len(left) >= LEAST_FOR_DIRECTIONS:  # as a fit does it
+        known = uncertainty_by_direction(known, points[inliers], left, 1.0)
     return _holds(known, rotation, translation, table.rotation, table.translation)
 
 

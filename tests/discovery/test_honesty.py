@@ -57,8 +57,8 @@ def test_an_effect_outside_of_the_catalogue_gets_no_wrong_name(effect):
     column = seen.line.truth[0]["where"].get("column")
     wrong = [each for each in seen.found.accepted if each.named and each.term.where.get("column") != column]
     assert not wrong
-    described = any(each.term.effect in ("deformation", "covariate") for each in seen.found.accepted)
-    assert seen.found.unexplained.present or described
+    right = column is not None and any(each.term.where.get("column") == column for each in seen.found.accepted)
+    assert seen.found.unexplained.present or right
 
 
 def test_columns_of_all_kinds_do_no_harm():

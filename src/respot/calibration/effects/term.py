@@ -175,13 +175,6 @@ def vector(prefix: str, unit: str, prior: float) -> tuple[Parameter, ...]:
     return tuple(Parameter(f"{prefix}{axis}", unit, prior) for axis in "xyz")
 
 
-def motion(points: Array, values: Array) -> Array:
-    """Columns (n, 3, 6) of a rigid motion [mm, deg] about the points' centroid that follows values (n,)."""
-    total = max(float(np.abs(values).sum()), 1e-12)
-    centre = (np.abs(values)[:, None] * points).sum(axis=0) / total
-    return motion_about(points, values, centre)
-
-
 def motion_about(points: Array, values: Array, centre: Array) -> Array:
     """Columns (n, 3, 6) of a rigid motion [mm, deg] about a centre (3,) [mm] that follows values (n,)."""
     turning = np.radians(np.cross(np.eye(3)[None], (points - centre)[:, None, :]))
