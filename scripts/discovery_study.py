@@ -36,11 +36,11 @@ from scipy import stats
 from scipy.spatial.transform import RigidTransform
 
 from respot.calibration.covariates import covariates_of
-from respot.calibration.discovery.bank import Bank, columns_of
+from respot.calibration.discovery.bank import Bank
 from respot.calibration.discovery.discover import Discovery, discover
 from respot.calibration.discovery.joint_fit import fit_jointly
 from respot.calibration.discovery.selection import Selection
-from respot.calibration.effects.catalogue import terms_of
+from respot.calibration.effects.catalogue import columns_of, terms_of
 from respot.calibration.effects.moved import moved
 from respot.calibration.observations import Observations
 from respot.kinematics.robots import find_robot

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from respot.calibration.effects.catalogue import MECHANISMS
-from respot.calibration.effects.moved import missing, moved, unmoved
+from respot.calibration.effects.moved import at_tip, missing, moved, unmoved
 from respot.calibration.effects.term import Term
 from respot.calibration.observations import Observations
 from respot.calibration.precision import Precision
@@ -180,7 +180,8 @@ class Calibration:
 
     def effect_columns(self, observations: Observations) -> Array:
         """Shift (n, 3, k) of each spot per unit of each parameter of the effects, reference frame."""
-        shifts = [MECHANISMS[term.effect].shifts(observations, term) for term in self.terms]
+        there = at_tip(observations, self.terms, self.values)
+        shifts = [MECHANISMS[term.effect].shifts(there, term) for term in self.terms]
         return np.asarray(self.rotation @ np.concatenate(shifts, axis=2))
 
     def unpredict(self, points: ArrayLike, rotations: Rotation | None, observations: Observations | None) -> Array:

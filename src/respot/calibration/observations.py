@@ -19,6 +19,10 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 DOWN = np.array([0.0, 0.0, -1.0])
+_OF_JOINTS = frozenset(
+    {"tools", "flange2base", "flange_jacobian", "parameter_jacobian", "link_frames", "gravity_levers"}
+)
+"""What does not depend on where the TCP is, and is worth keeping."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +82,17 @@ class Observations:
             columns={name: column.rows(rows) for name, column in self.columns.items()},
         )
 
+    def at(self, positions: Array) -> Observations:
+        """Return the same spots of the same arm with their TCP elsewhere (n, 3), source frame [mm]."""
+        found = replace(self, positions=positions)
+        for name in _OF_JOINTS & self.__dict__.keys():
+            found.__dict__[name] = self.__dict__[name]
+        return found
+
+    def tipped(self, offset: Array) -> Observations:
+        """Return the same spots with their TCP moved by an offset (3,) along the axes of the tool [mm]."""
+        return self.at(self.positions + self.tools @ offset) if np.any(offset) else self
+
     @property
     def has_arm(self) -> bool:
         """Whether the arm's own effects can be computed."""
@@ -110,16 +125,32 @@ class Observations:
         return self.robot.forward(self.joints)
 
     @cached_property
+    def flange_jacobian(self) -> Array:
+        """Motion of the flange with the joints: `RobotModel.jacobian`."""
+        assert self.robot is not None and self.joints is not None  # noqa: S101
+        return self.robot.jacobian(self.joints)
+
+    @cached_property
+    def parameter_jacobian(self) -> Array:
+        """Motion of the flange with the robot's parameters: `RobotModel.parameter_jacobian`."""
+        assert self.robot is not None and self.joints is not None  # noqa: S101
+        return self.robot.parameter_jacobian(self.joints)
+
+    @cached_property
+    def link_frames(self) -> tuple[Array, Array]:
+        """Frames behind the axes: `RobotModel.frames`."""
+        assert self.robot is not None and self.joints is not None  # noqa: S101
+        return self.robot.frames(self.joints)
+
+    @cached_property
     def joint_columns(self) -> Array:
         """Shift of the TCP per degree (mm) of each axis, source frame, (n, 3, axes)."""
-        assert self.robot is not None and self.joints is not None  # noqa: S101
-        return self._at_tcp(self.robot.jacobian(self.joints))
+        return self._at_tcp(self.flange_jacobian)
 
     @cached_property
     def parameter_columns(self) -> Array:
         """Shift of the TCP per unit [mm, deg] of each of the robot's parameters, source frame, (n, 3, parameters)."""
-        assert self.robot is not None and self.joints is not None  # noqa: S101
-        return self._at_tcp(self.robot.parameter_jacobian(self.joints))
+        return self._at_tcp(self.parameter_jacobian)
 
     @cached_property
     def link_columns(self) -> Array:
@@ -127,8 +158,7 @@ class Observations:
 
         Translations along and turns about the axes of the frame behind each joint.
         """
-        assert self.robot is not None and self.joints is not None  # noqa: S101
-        rotations, origins = self.robot.frames(self.joints)
+        rotations, origins = self.link_frames
         levers = self.points_in_base[:, None, :] - origins
         blocks = []
         for axis in range(3):

@@ -14,9 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from respot.calibration.effects.catalogue import MECHANISMS
 from respot.calibration.effects.term import Term
-from respot.calibration.observations import Observations
 from respot.registration.covariance import jacobian
 
 Array = NDArray[np.float64]
@@ -47,15 +45,6 @@ class Gains:
     ranks: Rows
     sizes: Array
     whiteners: dict[int, Array]
-
-
-def columns_of(observations: Observations, terms: Sequence[Term]) -> Array:
-    """Columns (n, 3, all parameters) of terms, in units of their priors [mm]."""
-    blocks = [
-        MECHANISMS[term.effect].shifts(observations, term) * np.array([each.prior for each in term.parameters])
-        for term in terms
-    ]
-    return np.concatenate([np.empty((len(observations), 3, 0)), *blocks], axis=2)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from respot.calibration.discovery.bank import Bank, columns_of
+from respot.calibration.discovery.bank import Bank
 from respot.calibration.discovery.evening import evening
 from respot.calibration.discovery.heldout import HeldOut, folds_of, heldout
 from respot.calibration.discovery.joint_fit import SCALE_FLOOR, JointFit, fit_jointly
@@ -19,8 +19,8 @@ from respot.calibration.discovery.selection import Selection, State
 from respot.calibration.discovery.significance import DRAWS
 from respot.calibration.discovery.unexplained import Unexplained, unexplained
 from respot.calibration.effects import link_geometry, readback_lag, scale, tool_shift
-from respot.calibration.effects.catalogue import MECHANISMS, terms_of
-from respot.calibration.effects.moved import moved
+from respot.calibration.effects.catalogue import MECHANISMS, columns_of, terms_of
+from respot.calibration.effects.moved import moved, tip_of
 from respot.calibration.effects.term import Term
 from respot.calibration.observations import Observations
 from respot.registration.robust import fit_robust
@@ -36,6 +36,8 @@ _ALL_FOLDS = 400
 _ALIAS = 1e-6
 _ALIAS_P = 0.01
 _HIDDEN = 0.05
+_FAR_MM, _CLEARLY = 20.0, 10.0
+"""A tool that is wrong by more than this, and by so many times its standard deviation, is looked for from there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,11 +104,12 @@ class Discovery:
 
 @dataclass(frozen=True, eq=False)
 class _Search:
-    """What a search needs, once for all spots."""
+    """What a search needs, once for all spots; the columns are those of a tool that is ``tip`` (3,) off [mm]."""
 
     observations: Observations
     reference: Array
     terms: tuple[Term, ...]
+    tip: Array
     columns: Array
     allowed: Mask
     aliases: tuple[int, ...]
@@ -123,9 +126,16 @@ class _Search:
             columns=self.columns[rows],
         )
 
+    def at(self, tip: Array) -> _Search:
+        """The same with the columns of a tool that is so far off: levers reach to where the tool really ends."""
+        columns = columns_of(self.observations.tipped(tip), self.terms)
+        aliases, allowed = _choices(self.terms, columns, self.observations.positions)
+        return replace(self, tip=tip, columns=columns, aliases=aliases, allowed=allowed)
+
 
 @dataclass(frozen=True, eq=False)
 class _Found:
+    search: _Search
     selection: Selection
     state: State
     fit: JointFit
@@ -171,9 +181,10 @@ def discover(
     if inliers is not None and not inliers.all():
         starts.append(inliers)
     found = min((_settle(search, start, draws) for start in starts), key=lambda each: misfit(each.fit))
-    found = _gated(search, found)
+    search = found.search
+    found = _gated(found)
     folds = folds_of(observations)
-    accepted = _accepted(search, found, folds)
+    accepted = _accepted(found, folds)
     left = unexplained(found.fit, observations, noise, seed)
     shaped = any(MECHANISMS[each.term.effect].describes for each in accepted)
     accepted = tuple(replace(each, named=_named(each, left, found.fit, noise, shaped)) for each in accepted)
@@ -206,13 +217,32 @@ def _prepared(
 ) -> _Search:
     terms = tuple(terms_of(observations, effects))
     columns = columns_of(observations, terms)
-    bank = Bank(terms, columns, observations.positions)
+    aliases, allowed = _choices(terms, columns, observations.positions)
+    search = _Search(observations, reference, terms, np.zeros(3), columns, allowed, aliases, noise, seed, step)
+    tip = _far_tip(search)
+    return search if tip is None else search.at(tip)
+
+
+def _choices(terms: Sequence[Term], columns: Array, points: Array) -> tuple[tuple[int, ...], Mask]:
+    """Terms that move spots as a tool offset does, and which of all terms may be chosen."""
+    bank = Bank(terms, columns, points)
     # directions that even the widest plausible error hides behind rounding
     whole = bank.gains(bank.span((), 0.0), np.zeros(columns.shape[2]), 0.0)
     aliases = _aliases_of_tool(terms, columns)
     allowed = whole.ranks > 0
     allowed[list(aliases)] = False
-    return _Search(observations, reference, terms, columns, allowed, aliases, noise, seed, step)
+    return aliases, allowed
+
+
+def _far_tip(search: _Search) -> Array | None:
+    """Where the tool (3,) clearly ends far from where the poses have it: they are the flange's, or another tool's."""
+    tools = [term for term in search.terms if term.effect == tool_shift.NAME]
+    if not tools:
+        return None
+    fit = fit_jointly(search.observations, search.reference, tools, np.ones(len(search.reference), dtype=np.bool_))
+    far = float(np.linalg.norm(fit.values[0]))
+    clearly = far > _CLEARLY * float(np.linalg.norm(fit.value_sd[0]))
+    return fit.values[0] if far > _FAR_MM and clearly else None
 
 
 def _aliases_of_tool(terms: Sequence[Term], columns: Array) -> tuple[int, ...]:
@@ -249,13 +279,17 @@ def _settle(search: _Search, inliers: Mask, draws: int) -> _Found:
         state = selection.search(start) if judged else selection.state((), 0.0)
         chosen = tuple(sorted(state.chosen))
         fit = fit_jointly(search.observations, search.reference, [search.terms[i] for i in chosen], inliers)
-        found = _Found(selection, selection.state(chosen, selection.sigma(state)), fit)
+        found = _Found(search, selection, selection.state(chosen, selection.sigma(state)), fit)
         inliers = settled(fit)
         key = (np.packbits(inliers).tobytes(), chosen)
         # once more where the noise turns out not to be alike along all axes
-        if key in seen and (even is not None) == (fit.noise is not None):
+        tip = tip_of(fit.terms, fit.values)
+        there = not np.any(tip) or float(np.abs(tip - search.tip).max()) <= _FAR_MM / 2.0
+        if key in seen and (even is not None) == (fit.noise is not None) and there:
             break
         seen.add(key)
+        if not there:
+            search = search.at(tip)
         if not np.array_equal(inliers, fit.inliers):
             fit = fit_jointly(search.observations, search.reference, fit.terms, inliers, fit.values)
     assert found is not None  # noqa: S101 - at least one round
@@ -270,8 +304,9 @@ def _selection(search: _Search, fit: JointFit, draws: int, even: Array | None) -
     return Selection(bank, wanted, search.noise, search.allowed, draws=draws, seed=search.seed, step=search.step)
 
 
-def _gated(search: _Search, found: _Found) -> _Found:
+def _gated(found: _Found) -> _Found:
     """Leave out terms that do not help spots that were held out, by at least two ways to fold."""
+    search = found.search
     while found.state.chosen:
         folds = folds_of(search.observations)
         failing = []
@@ -294,7 +329,7 @@ def _gated(search: _Search, found: _Found) -> _Found:
         chosen = tuple(i for i in found.state.chosen if i != worst)
         fit = fit_jointly(search.observations, search.reference, [search.terms[i] for i in chosen], found.fit.inliers)
         selection = _selection(search, fit, found.selection.draws, evening(fit.noise))
-        found = _Found(selection, selection.state(chosen, found.fit.sigma), fit)
+        found = _Found(search, selection, selection.state(chosen, found.fit.sigma), fit)
     return found
 
 
@@ -310,8 +345,8 @@ def _skipped(observations: Observations, term: Term) -> frozenset[str]:
     return frozenset({"time"}) if column is not None and column.role == "time" else frozenset()
 
 
-def _accepted(search: _Search, found: _Found, folds: dict[str, NDArray[np.intp]]) -> tuple[Accepted, ...]:
-    selection, fit = found.selection, found.fit
+def _accepted(found: _Found, folds: dict[str, NDArray[np.intp]]) -> tuple[Accepted, ...]:
+    search, selection, fit = found.search, found.selection, found.fit
     state = selection.state(found.state.chosen, fit.sigma)
     made = []
     for place, index in enumerate(found.state.chosen):
@@ -325,7 +360,7 @@ def _accepted(search: _Search, found: _Found, folds: dict[str, NDArray[np.intp]]
             selection.chance_of(state, index),
             table,
             heldout(fit, folds, skip),
-            _tool_aliases(search, found, index),
+            _tool_aliases(found, index),
             named=False,
         )
         rest = selection.state([i for i in state.chosen if i != index], fit.sigma)
@@ -339,8 +374,9 @@ def _accepted(search: _Search, found: _Found, folds: dict[str, NDArray[np.intp]]
     return tuple(replace(one, aliases=(*one.aliases, *beside.get(one.term.effect, ()))) for one in accepted)
 
 
-def _tool_aliases(search: _Search, found: _Found, index: int) -> tuple[Term, ...]:
+def _tool_aliases(found: _Found, index: int) -> tuple[Term, ...]:
     """Of a tool offset: single causes in the arm that explain it as well as the offset does."""
+    search = found.search
     if search.terms[index].effect != "tool_offset":
         return ()
     others = [search.terms[i] for i in found.state.chosen if i != index]
@@ -420,7 +456,7 @@ def _nested(search: _Search, inliers: Mask, labels: NDArray[np.intp], draws: int
         start = np.ones(len(rest), dtype=np.bool_)
         if not inliers.all():
             start = fit_robust(part.observations.positions, part.reference, seed=search.seed).inliers
-        found = _gated(part, _settle(part, start, min(draws, _INNER_DRAWS)))
+        found = _gated(_settle(part, start, min(draws, _INNER_DRAWS)))
         errors[out] = _errors(search, found.fit, out)
         search.step()
     return errors

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from respot.calibration.discovery.evening import uneven_noise
-from respot.calibration.effects.catalogue import MECHANISMS
-from respot.calibration.effects.moved import moved
+from respot.calibration.effects.catalogue import columns_of
+from respot.calibration.effects.moved import moved, tip_of
 from respot.calibration.effects.term import Term
 from respot.calibration.observations import Observations
 from respot.registration.covariance import jacobian
@@ -24,6 +24,8 @@ Mask = NDArray[np.bool_]
 
 SCALE_FLOOR = 1e-3
 """A finer scale than a micrometre is printing, not noise [mm]."""
+TIP_MM = 2.0
+"""Columns are made anew where the tool turns out to be this far from where they were made: levers are metres."""
 _TURNS = 25
 _STILL = 1e-9
 
@@ -146,7 +148,7 @@ def split_by(vector: Array, sizes: Sequence[int]) -> tuple[Array, ...]:
 def fit_jointly(
     observations: Observations, reference: Array, terms: Sequence[Term], inliers: Mask, start: Sequence[Array] = ()
 ) -> JointFit:
-    """Least squares over the inliers: Gauss-Newton with the columns of the nominal poses, exact predictions.
+    """Least squares over the inliers: Gauss-Newton with the columns of the nominal arm and tool, exact predictions.
 
     Parameters
     ----------
@@ -162,9 +164,8 @@ def fit_jointly(
     points = observations.positions
     extent = max(float(np.sqrt(np.mean((points[inliers] - points[inliers].mean(axis=0)) ** 2))), 1e-9)
     priors = np.array([parameter.prior for term in terms for parameter in term.parameters])
-    blocks = [MECHANISMS[term.effect].shifts(observations, term) for term in terms]
-    columns = np.concatenate([np.empty((len(points), 3, 6)), *blocks], axis=2)
-    columns[:, :, 6:] *= priors
+    columns = np.empty((len(points), 3, 6 + len(priors)))
+    tip = np.full(3, np.inf)
     sizes = [len(term.parameters) for term in terms]
     scaled = np.concatenate([*start]) / priors if start else np.zeros(len(priors))
     count = int(inliers.sum())
@@ -174,6 +175,10 @@ def fit_jointly(
         return split_by(vector * priors, sizes)
 
     for _ in range(_TURNS):
+        now = tip_of(terms, split(scaled))
+        if float(np.abs(now - tip).max()) > TIP_MM:
+            tip = now
+            columns[:, :, 6:] = columns_of(observations.tipped(tip), terms)
         places, _rotations = moved(observations, terms, split(scaled))
         rotation, translation = transform_of(places[inliers], reference[inliers])
         left = ((reference - translation) @ rotation - places)[inliers].ravel()

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
 from respot.calibration.effects import (
     backlash,
     covariate,
@@ -24,6 +29,8 @@ from respot.calibration.effects import (
 )
 from respot.calibration.effects.term import Mechanism, Term
 from respot.calibration.observations import Observations
+
+Array = NDArray[np.float64]
 
 MECHANISMS: dict[str, Mechanism] = {
     mechanism.name: mechanism
@@ -63,3 +70,12 @@ def terms_of(observations: Observations, names: frozenset[str] | None = None) ->
         if (names is None or name in names) and not (observations.absolute_accuracy and name in OF_THE_ARM)
         for term in mechanism.terms(observations)
     ]
+
+
+def columns_of(observations: Observations, terms: Sequence[Term]) -> Array:
+    """Columns (n, 3, all parameters) of terms, in units of their priors [mm]."""
+    blocks = [
+        MECHANISMS[term.effect].shifts(observations, term) * np.array([each.prior for each in term.parameters])
+        for term in terms
+    ]
+    return np.concatenate([np.empty((len(observations), 3, 0)), *blocks], axis=2)

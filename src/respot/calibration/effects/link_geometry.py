@@ -46,8 +46,8 @@ def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:  # 
 
 
 def _turns(observations: Observations, term: Term) -> NDArray[np.float64]:
-    assert observations.robot is not None and observations.joints is not None  # noqa: S101 - the term was made of them
-    frames, _ = observations.robot.frames(observations.joints)
+    assert observations.robot is not None  # noqa: S101 - the term was made of it
+    frames, _ = observations.link_frames
     found = np.zeros((len(observations), 3, len(term.parameters)))
     for axis in range(observations.robot.axes - 1):
         found[:, :, 6 * axis + 3 : 6 * axis + 6] = observations.in_source(frames[:, axis])

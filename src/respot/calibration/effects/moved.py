@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from respot.calibration.effects import joint_profile
+from respot.calibration.effects import joint_profile, tool_shift
 from respot.calibration.effects.catalogue import MECHANISMS
 from respot.calibration.effects.term import Term
 from respot.calibration.observations import Observations
@@ -25,8 +24,9 @@ _NEAR = 1.2
 def moved(observations: Observations, terms: Sequence[Term], values: Sequence[Array]) -> tuple[Array, Rotation | None]:
     """Poses of the TCP with the effects in them, source frame.
 
-    Errors of joints and lengths go through the arm's own kinematics (DESIGN section 6: ``FK(q + dq, geometry + dg) *
-    tool * dtool``); shifts in the tool turn with it; shifts of the part come last.
+    Errors of joints and lengths go through the arm's own kinematics with the tool as it is (DESIGN section 6: ``FK(q +
+    dq, geometry + dg) * tool * dtool``); other shifts in the tool turn with it; shifts of the part come last, and are
+    those of the place where the tool really is.
 
     Parameters
     ----------
@@ -40,6 +40,7 @@ def moved(observations: Observations, terms: Sequence[Term], values: Sequence[Ar
     ((n, 3) array, Rotation of n or None)
         [mm]
     """
+    observations = at_tip(observations, terms, values)
     points, rotations = observations.positions, observations.rotations
     turned: Rotation | None = None
     arm = [(term, value) for term, value in zip(terms, values, strict=True) if _through_arm(term)]
@@ -47,7 +48,7 @@ def moved(observations: Observations, terms: Sequence[Term], values: Sequence[Ar
         points, turned = _through(observations, arm)
         rotations = None if rotations is None else turned * rotations
     for term, value in zip(terms, values, strict=True):
-        if _through_arm(term):
+        if _through_arm(term) or term.effect == tool_shift.NAME:
             continue
         mechanism = MECHANISMS[term.effect]
         shift = mechanism.shifts(observations, term) @ value
@@ -56,6 +57,17 @@ def moved(observations: Observations, terms: Sequence[Term], values: Sequence[Ar
             vectors = mechanism.turns(observations, term) @ value
             rotations = Rotation.from_rotvec(vectors, degrees=True) * rotations
     return points, rotations
+
+
+def at_tip(observations: Observations, terms: Sequence[Term], values: Sequence[Array]) -> Observations:
+    """Return the spots where a tool offset among the terms has them."""
+    return observations.tipped(tip_of(terms, values))
+
+
+def tip_of(terms: Sequence[Term], values: Sequence[Array]) -> Array:
+    """Offset (3,) of the tool among terms, 0 without one [mm]."""
+    offsets = [value for term, value in zip(terms, values, strict=True) if term.effect == tool_shift.NAME]
+    return np.asarray(np.sum([np.zeros(3), *offsets], axis=0))
 
 
 def missing(observations: Observations, term: Term) -> str:
@@ -149,7 +161,7 @@ def unmoved(observations: Observations, terms: Sequence[Term], values: Sequence[
     """
     found = wanted.copy()
     for _ in range(_TURNS):
-        there, _ = moved(replace(observations, positions=found), terms, values)
+        there, _ = moved(observations.at(found), terms, values)
         step = wanted - there
         found = found + step
         if float(np.abs(step).max(initial=0.0)) < _STILL_MM:
