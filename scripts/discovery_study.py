@@ -14,7 +14,9 @@ coverage  how often 95 % intervals hold the truth, given the right model
 time      seconds for 120 spots with 20 columns, and for 2,000 spots
 
 A finding counts as the truth with the right axis, column, level, group or ids. "found": it is named, or it is first in
-the list with at most 4 rivals that are not separated from it. Everything listed counts as claimed.
+the list with at most 4 rivals that are not separated from it. Everything listed counts as claimed. "among 5": among at
+most 5 explanations of the finding that is listed first. "nearest 5": among the first five that the report shows: that
+finding and its rivals, then what was tried and not proved, the least likely to come by chance first.
 """
 
 from __future__ import annotations
@@ -39,6 +41,7 @@ from respot.calibration.covariates import covariates_of
 from respot.calibration.discovery.bank import Bank
 from respot.calibration.discovery.discover import Discovery, discover
 from respot.calibration.discovery.joint_fit import fit_jointly
+from respot.calibration.discovery.records import tried_of
 from respot.calibration.discovery.selection import Selection
 from respot.calibration.effects.catalogue import columns_of, terms_of
 from respot.calibration.effects.moved import moved
@@ -74,6 +77,7 @@ class Trial:
 
     truth: tuple[Mapping[str, Any], ...]
     claims: tuple[Claim, ...]
+    tried: tuple[tuple[str, Mapping[str, Any]], ...]
     unexplained: bool
     seconds: float
     sigma: float
@@ -130,7 +134,8 @@ def trial(job: tuple[tuple[str, ...], int, str, int]) -> Trial:
         )
         for each in found.accepted
     )
-    return Trial(line.truth, claims, found.unexplained.present, time.perf_counter() - start, found.fit.sigma)
+    tried = tuple((record["name"], record["where"]) for record in tried_of(found))
+    return Trial(line.truth, claims, tried, found.unexplained.present, time.perf_counter() - start, found.fit.sigma)
 
 
 def same(truth: Mapping[str, Any], name: str, where: Mapping[str, Any]) -> bool:
@@ -162,6 +167,14 @@ def among(one: Trial, truth: Mapping[str, Any]) -> bool:
     return len(every) <= 5 and any(same(truth, name, where) for name, where in every)
 
 
+def nearest(one: Trial, truth: Mapping[str, Any]) -> bool:
+    """Whether a truth is among the first five of what a report shows, claimed or not."""
+    every = [(claim.name, claim.where) for claim in one.claims[:1]] + [
+        r for claim in one.claims[:1] for r in claim.rivals
+    ]
+    return any(same(truth, name, where) for name, where in [*every, *one.tried][:5])
+
+
 def wrong(one: Trial, *, named: bool) -> bool:
     """Whether something is claimed (or called by name) that is not true."""
     return any(
@@ -190,7 +203,10 @@ def _names() -> list[str]:
 
 def _table(title: str, trials: Mapping[str, list[Trial]], verbose: bool) -> None:
     print(f"\n{title}")
-    print(f"{'effect':16}{'n':>5}{'named':>8}{'found':>8}{'first':>8}{'among 5':>9}{'wrong':>8}{'wrong named':>13}")
+    print(
+        f"{'effect':16}{'n':>5}{'named':>8}{'found':>8}{'first':>8}{'among 5':>9}{'nearest 5':>11}{'wrong':>8}"
+        f"{'wrong named':>13}"
+    )
     every = [one for each_kind in trials.values() for one in each_kind]
     for name, some in [*trials.items(), ("all", every)]:
         rows = [
@@ -199,6 +215,7 @@ def _table(title: str, trials: Mapping[str, list[Trial]], verbose: bool) -> None
                 found_in(one, one.truth[0]),
                 bool(one.claims) and same(one.truth[0], one.claims[0].name, one.claims[0].where),
                 among(one, one.truth[0]),
+                nearest(one, one.truth[0]),
                 wrong(one, named=False),
                 wrong(one, named=True),
             ]
@@ -206,8 +223,8 @@ def _table(title: str, trials: Mapping[str, list[Trial]], verbose: bool) -> None
         ]
         shares = np.mean(rows, axis=0)
         print(
-            f"{name:16}{len(some):5}{shares[0]:8.1%}{shares[1]:8.1%}{shares[2]:8.1%}{shares[3]:9.1%}{shares[4]:8.1%}"
-            f"{shares[5]:13.1%}",
+            f"{name:16}{len(some):5}{shares[0]:8.1%}{shares[1]:8.1%}{shares[2]:8.1%}{shares[3]:9.1%}{shares[4]:11.1%}"
+            f"{shares[5]:8.1%}{shares[6]:13.1%}",
             flush=True,
         )
         if verbose and name != "all":

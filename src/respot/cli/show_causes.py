@@ -72,7 +72,7 @@ def _show_lost(fit: SpotFit, record: Mapping[str, Any]) -> None:
     if tried:
         names = [f"{each['name']} {place(each['where'])}".strip() for each in tried[:_MOST_TRIED]]
         more = f" and {len(tried) - _MOST_TRIED} more" if len(tried) > _MOST_TRIED else ""
-        line(f"  tried and not needed, the nearest first: {', '.join(names)}{more}")
+        line(f"  tried and not proved, the nearest first: {', '.join(names)}{more}")
 
 
 def _show_unknown(record: Mapping[str, Any]) -> None:

@@ -62,9 +62,9 @@ def _effect(each: Accepted, found: Discovery) -> Effect:
 
 
 def tried_of(found: Discovery) -> list[dict[str, Any]]:
-    """What was tried and is not in the model, the nearest to it first."""
+    """What was tried and is not in the model, the least likely to come by chance first."""
     records = []
-    for term, chance, beyond in sorted(found.tried, key=lambda each: each[2]):
+    for term, chance, beyond in sorted(found.tried, key=lambda each: each[1:]):
         if chance > 0.01:
             verdict = f"chance explains as much (p = {chance:.2g})"
         elif beyond < 0.0:

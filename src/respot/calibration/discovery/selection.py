@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from respot.calibration.discovery.bank import Bank, Gains, Span
-from respot.calibration.discovery.significance import ALPHA, largest_by_chance, normal_score, p_value
+from respot.calibration.discovery.significance import ALPHA, Chance, by_chance, normal_score, p_value
 from respot.calibration.effects.catalogue import MECHANISMS
 
 Array = NDArray[np.float64]
@@ -111,6 +111,8 @@ class Selection:
         kinds = [MECHANISMS[term.effect] for term in bank.terms]
         self.handicap = np.array([_EACH + _LAST * kind.describes + _POINTS * kind.points for kind in kinds])
         self._keys = [term.key for term in bank.terms]
+        numbers: dict[str, int] = {}
+        self._effects = np.array([numbers.setdefault(t.effect, len(numbers)) for t in bank.terms], dtype=np.intp)
 
     @property
     def count(self) -> int:
@@ -241,19 +243,18 @@ class Selection:
         if not allowed.any():
             return None
         score = np.where(allowed, self.scores(state, gains), -np.inf)
-        best = float(score.max())
-        if best < OBVIOUS:
+        limit = OBVIOUS / 2.0
+        if float(score.max()) < OBVIOUS:
             chance = self._chance(state, allowed)
-            if p_value(best, chance) > ALPHA:
+            score = chance.scores(score, self._effects)
+            if p_value(float(score.max()), chance) > ALPHA:
                 return None
-            limit = float(np.quantile(chance, 1.0 - ALPHA))
-        else:
-            limit = OBVIOUS / 2.0
+            limit = chance.limit(ALPHA)
         criteria = np.where(score >= limit, self.beside(state), np.inf)
         return int(np.argmin(criteria)) if np.isfinite(criteria.min()) else None
 
-    def _chance(self, state: State, allowed: Mask) -> Array:
-        """Largest score by chance beside a state, for each draw; of very many spots on a sample of them."""
+    def _chance(self, state: State, allowed: Mask) -> Chance:
+        """What chance gains beside a state; of very many spots on a sample of them."""
         small, rows = self._small
         basis = self.bank.basis(state.span)
         left = self.wanted - basis @ state.shares
@@ -265,7 +266,7 @@ class Selection:
             left = left - basis @ (basis.T @ left)
         free = max(len(left) - 6 - basis.shape[1], 1)
         gains = small.gains(span, small.columns.T @ left, self.sigma(state))
-        return largest_by_chance(small, basis, left, gains, allowed, free, draws=self.draws, seed=self.seed)
+        return by_chance(small, basis, left, gains, allowed, self._effects, free, draws=self.draws, seed=self.seed)
 
     @cached_property
     def _small(self) -> tuple[Bank, NDArray[np.intp]]:
@@ -275,10 +276,11 @@ class Selection:
         """P value of one term of a state, the others given."""
         rest = self.state([i for i in state.chosen if i != index], self.sigma(state))
         gains = self.gains(rest)
-        score = float(self.scores(rest, gains)[index])
-        if score >= OBVIOUS:
+        score = self.scores(rest, gains)
+        if score[index] >= OBVIOUS:
             return 1.0 / (1.0 + self.draws)
-        return p_value(score, self._chance(rest, self.allowed & ~self._taken(rest)))
+        chance = self._chance(rest, self.allowed & ~self._taken(rest))
+        return p_value(float(chance.scores(score, self._effects)[index]), chance)
 
     def chances(self, state: State) -> Array:
         """P value (terms,) of each term that is not in a state, were it added; 1 for those that cannot be."""
@@ -286,10 +288,11 @@ class Selection:
         allowed = self.allowed & ~self._taken(state) & (gains.ranks > 0)
         if not allowed.any():
             return np.ones(len(self.bank))
-        score = self.scores(state, gains)
-        chance = np.sort(self._chance(state, allowed))
-        above = len(chance) - np.searchsorted(chance, score, side="left")
-        return np.where(allowed, (1.0 + above) / (1.0 + len(chance)), 1.0)
+        chance = self._chance(state, allowed)
+        largest = np.sort(chance.largest)
+        score = chance.scores(self.scores(state, gains), self._effects)
+        above = len(largest) - np.searchsorted(largest, score, side="left")
+        return np.where(allowed, (1.0 + above) / (1.0 + len(largest)), 1.0)
 
     def _exchange(self, state: State, among: Mask | None = None) -> State:
         """Replace one term by another as long as the criterion falls."""
