@@ -86,6 +86,9 @@ CODES: dict[str, tuple[Level, str]] = {
     "EFFECT_FOUND": (_W, "the residual follows an effect that the rigid transform lacks"),
     "UNEXPLAINED": (_W, "structure is left that no effect explains"),
     "ABSOLUTE_ACCURACY": (_W, "the controller compensates the arm's own errors: effects of the arm are refused"),
+    # comparing two states
+    "DIFFERENT_ROBOTS": (_E, "two sources hold no robot, or no language, in common"),
+    "OTHER_ROBOT_COMPARED": (_W, "two robots with different serial numbers are compared"),
     # using a stored calibration
     "EFFECT_LEFT_OUT": (_W, "a column that an effect follows is not known: the effect is left out"),
     "ANOTHER_ROBOT": (_E, "a calibration was fitted to another robot"),

@@ -17,6 +17,9 @@ MOST_DECIMALS = 12
 SAME_POSITION_MM = 1e-9
 SAME_ROTATION_DEG = 1e-9
 
+#: A target under another name, used in the same way, is the same target up to this distance.
+RENAMED_WITHIN_MM = 10.0
+
 #: |q| of a programmed quaternion may differ from 1 by this much; pendants print six digits.
 QUATERNION_NORM = 1e-3
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, TypedDict
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypedDict
 import typer
 
 from respot.cli import options
+from respot.cli.files import check_free, write_text
 from respot.cli.outcome import Outcome
 from respot.cli.outcome import run as run_command
 from respot.issues import BadInputError
@@ -84,7 +84,7 @@ def run(
             raise BadInputError("BAD_OPTION", message)
         inputs = [source, reference, *([chosen.holdout] if isinstance(chosen.holdout, Path) else [])]
         for option, path in (("-o", output), ("--report", report_file)):
-            _check_free(path, option, inputs, force)
+            check_free(path, option, inputs, force)
         model = None if robot is None else robot_of(robot)
         chosen = replace(chosen, profiles=tuple(profile or ()), effects=looked_for, robot=model)
         with progress("looking for effects", shown=looked_for != () and not as_json) as step:
@@ -99,7 +99,7 @@ def run(
                     "how), then fit and save"
                 )
                 raise BadInputError("BAD_OPTION", message, str(source))
-            _written(output, precise(fitted.fit).to_json())
+            write_text(output, precise(fitted.fit).to_json())
         if report_file is not None:
             page = fit_page(
                 data,
@@ -111,30 +111,11 @@ def run(
                 issues=[issue.as_json() for issue in fitted.issues],
                 seed=seed,
             )
-            _written(report_file, page)
+            write_text(report_file, page)
         shown = lambda: show_fit(fitted, data, tolerance, output, report_file)  # noqa: E731
         return Outcome("fit", data, shown, list(fitted.issues))
 
     run_command(work, as_json, strict)
-
-
-def _check_free(path: Path | None, option: str, inputs: Sequence[Path], force: bool) -> None:
-    """Refuse to write over a file, or into what is read."""
-    if path is None:
-        return
-    if path.exists() and not force:
-        message = f"exists; name another file with {option}, or replace it with --force"
-        raise BadInputError("OUTPUT_EXISTS", message, str(path))
-    if any(holds(read, path) for read in inputs):
-        message = f"lies in what is read; name another file with {option}"
-        raise BadInputError("OUTPUT_EXISTS", message, str(path))
-
-
-def _written(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise BadInputError("CANNOT_READ", f"cannot be written: {error.strerror}", str(path)) from error
 
 
 def holdout_of(text: str | None) -> float | Path | None:
@@ -197,12 +178,6 @@ def effects_named(text: str) -> Effects:
         return names_of(names)
     except RegistrationError as error:
         raise BadInputError("BAD_OPTION", f"--effects is auto, none or names with commas: {error}") from error
-
-
-def holds(source: Path, output: Path) -> bool:
-    """Whether writing ``output`` would change ``source``: it is the same file, or the source is a folder around it."""
-    own, other = source.resolve(), output.resolve()
-    return own == other or own in other.parents or own.with_suffix("") == other.with_suffix("")
 
 
 def reference_of(

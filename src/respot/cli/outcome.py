@@ -101,9 +101,17 @@ def _is_flat(value: dict[str, object] | list[object] | tuple[object, ...]) -> bo
     return len(value) <= _LONGEST_LINE and not any(isinstance(item, dict | list | tuple) for item in items)
 
 
+#: What a terminal takes for an order, or for a change of the direction of writing; a program's text may hold any.
+_ORDERS = (*range(9), *range(11, 32), *range(127, 160), *range(0x202A, 0x202F), *range(0x2066, 0x206A))
+_SPELLED = {order: f"\\u{order:04x}" for order in _ORDERS}
+
+
 def printable(text: str) -> str:
-    r"""Text that any terminal takes: bytes of a file name that are no UTF-8 become ``\udcfc``, as JSON spells them."""
-    return text.encode("utf-8", "backslashreplace").decode()
+    r"""Text that any terminal takes, and takes for nothing but text.
+
+    Control characters, and bytes of a file name that are no UTF-8, are spelled as in JSON: ``\u001b``, ``\udcfc``.
+    """
+    return text.translate(_SPELLED).encode("utf-8", "backslashreplace").decode()
 
 
 def say(issues: Iterable[Issue]) -> None:

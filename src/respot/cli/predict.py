@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from respot.cli import options
-from respot.cli.fit import holds
+from respot.cli.files import holds
 from respot.cli.outcome import Outcome
 from respot.cli.outcome import run as run_command
 from respot.issues import BadInputError

@@ -128,6 +128,12 @@ class Machine:
     lines: Mapping[str, int] = field(default_factory=dict)
 
 
+def _never(path: str, name: str) -> bool:
+    """Say that no code writes a datum."""
+    del path, name
+    return False
+
+
 @dataclass(frozen=True, eq=False)
 class Robot:
     """One robot of a backup.
@@ -156,6 +162,8 @@ class Robot:
         Task that moves it, where one controller moves several robots; empty otherwise. Such robots share ``root``.
     find_forms : callable
         Finds its inline forms, of which not every job asks.
+    writes : callable
+        ``writes(path, name)``: whether code may give a datum declared in a file another value while the robot runs.
     """
 
     name: str
@@ -170,6 +178,7 @@ class Robot:
     issues: Sequence[Issue]
     task: str = ""
     find_forms: Callable[[], Sequence[Form]] = tuple
+    writes: Callable[[str, str], bool] = _never
 
     @cached_property
     def forms(self) -> Sequence[Form]:

@@ -14,7 +14,7 @@ from respot.languages.krl.controller import read_facts
 from respot.languages.krl.forms import FORMS, Data, read_forms
 from respot.languages.krl.frames import Frames
 from respot.languages.krl.recognition import recognise
-from respot.languages.krl.run_time import read_run_time
+from respot.languages.krl.run_time import RunTime, read_run_time
 from respot.languages.krl.symbols import Scope, Symbols, is_own, module_key, read_definitions, read_symbols
 from respot.languages.krl.syntax import ENCODINGS, read_statements
 from respot.languages.krl.targets import Targets
@@ -81,8 +81,16 @@ def read_robots(name: str, root: str, files: Mapping[str, bytes], forms: Forms =
         bases=frames.declared("BASE"),
         issues=issues,
         find_forms=lambda: _forms(read, code, symbols, forms),
+        writes=lambda path, name: _is_written(symbols, run_time, path, name),
     )
     return [robot]
+
+
+def _is_written(symbols: Symbols, run_time: RunTime, path: str, name: str) -> bool:
+    """Whether code may change what a data list declares."""
+    scope = symbols.scopes.get(module_key(path))
+    symbol = None if scope is None or scope.path != path else scope.symbols.get("".join(name.split()).upper())
+    return symbol is not None and run_time.writes(symbol)
 
 
 def _forms(read: Mapping[str, ProgramFile], programs: Iterable[str], symbols: Symbols, forms: Forms) -> Sequence[Form]:

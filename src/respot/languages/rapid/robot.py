@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import PurePosixPath
 
@@ -66,6 +66,7 @@ def read_robots(name: str, root: str, files: Mapping[str, bytes], forms: Forms =
     moving = [task for task, found in bound.items() if any(routine.moves for routine in found.routines)]
     shares = share_tasks(root, data, list(tasks), moving)
     controller = data.facts["controller"].value if "controller" in data.facts else name
+    writes = _writes(tasks, run_times)
     robots = []
     for share in shares:
         parts = [bound[task] for task in share.folders]
@@ -83,9 +84,22 @@ def read_robots(name: str, root: str, files: Mapping[str, bytes], forms: Forms =
                 bases=[frame for part in parts for frame in part.bases],
                 issues=[*own, *share.issues, *(issue for part in parts for issue in part.issues)],
                 task=share.name if len(shares) > 1 else "",
+                writes=writes,
             )
         )
     return robots
+
+
+def _writes(tasks: Mapping[str, Sequence[Module]], run_times: Mapping[str, RunTime]) -> Callable[[str, str], bool]:
+    """Return what tells whether code of any task may change a datum of a module."""
+    modules = {module.path: (module, run_times[task]) for task, found in tasks.items() for module in found}
+
+    def writes(path: str, name: str) -> bool:
+        module, run_time = modules.get(path, (None, None))
+        symbol = None if module is None else module.symbols.get(name.lower())
+        return symbol is not None and run_time is not None and bool(run_time.changes(symbol))
+
+    return writes
 
 
 @dataclass(frozen=True, eq=False)

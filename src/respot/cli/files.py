@@ -1,0 +1,46 @@
+"""Files that a command writes beside its answer: a report, a calibration."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from respot.issues import BadInputError
+
+
+def check_free(path: Path | None, option: str, inputs: Sequence[Path], force: bool) -> None:
+    """Refuse to write over a file, or into what is read.
+
+    Raises
+    ------
+    BadInputError
+        ``OUTPUT_EXISTS``.
+    """
+    if path is None:
+        return
+    if path.exists() and not force:
+        message = f"exists; name another file with {option}, or replace it with --force"
+        raise BadInputError("OUTPUT_EXISTS", message, str(path))
+    if any(holds(read, path) for read in inputs):
+        message = f"lies in what is read; name another file with {option}"
+        raise BadInputError("OUTPUT_EXISTS", message, str(path))
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file.
+
+    Raises
+    ------
+    BadInputError
+        ``CANNOT_READ`` if it cannot be written.
+    """
+    try:
+        path.write_text(text, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise BadInputError("CANNOT_READ", f"cannot be written: {error.strerror}", str(path)) from error
+
+
+def holds(source: Path, output: Path) -> bool:
+    """Whether writing ``output`` would change ``source``: it is the same file, or the source is a folder around it."""
+    own, other = source.resolve(), output.resolve()
+    return own == other or own in other.parents or own.with_suffix("") == other.with_suffix("")

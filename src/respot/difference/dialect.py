@@ -1,0 +1,95 @@
+"""What a comparison must know of a language: how a file is divided, what statements are about, what is a frame."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from scipy.spatial.transform import RigidTransform
+
+from respot.program.statement import Statement
+from respot.source import Span
+
+
+@dataclass(frozen=True)
+class Datum:
+    """A name that a statement declares or gives a value, in upper case, with its type; empty for an assignment."""
+
+    name: str
+    type: str
+
+
+@dataclass(frozen=True, eq=False)
+class FrameValue:
+    """The value of a tool, base, load or other frame in its declaration.
+
+    Parameters
+    ----------
+    kind : str
+        ``tool``, ``base``, ``load`` or ``frame``.
+    name : str
+        As declared.
+    pose : RigidTransform or None
+        ``tool2flange``, ``base2world``; None where the literal does not give it.
+    fields : mapping of str to (float or str)
+        Everything else that it says, by name.
+    span : tuple
+        Its literal.
+    """
+
+    kind: str
+    name: str
+    pose: RigidTransform | None
+    span: Span
+    fields: Mapping[str, float | str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """A language as a comparison sees it.
+
+    Parameters
+    ----------
+    heads, ends : frozenset of str
+        Kinds of statements that begin and end a routine, or any other part whose statements are in order.
+    data : frozenset of str
+        Kinds of declarations; outside routines their order says nothing.
+    data_heads : frozenset of str
+        Heads of parts that hold nothing but data.
+    comments, folds : frozenset of str
+        Kinds of lines that say nothing to the robot.
+    name_of : callable
+        Name that a head gives its part.
+    declared : callable
+        What a declaration declares.
+    frames : callable
+        Frames among it: ``frames(path, statement)``.
+    noise : callable
+        Kind of noise that a changed statement is, given what it declares; empty if it is none.
+    about : callable
+        What a statement is about: ``motion``, ``speed``, ``io`` ...
+    aspects : callable
+        What of a changed statement differs, the most important first.
+    companions : callable
+        Names of data that take their name from a point's, in one order for all points.
+    persistent : callable
+        Whether a controller saves the value that a datum of this declaration has while the robot runs.
+    typed : callable
+        Whether the spelling of a datum's value shows that a person wrote it, not the controller.
+    """
+
+    heads: frozenset[str]
+    ends: frozenset[str]
+    data: frozenset[str]
+    data_heads: frozenset[str]
+    comments: frozenset[str]
+    folds: frozenset[str]
+    name_of: Callable[[Statement], str]
+    declared: Callable[[str, Statement], Sequence[Datum]]
+    frames: Callable[[str, Statement], Sequence[FrameValue]]
+    noise: Callable[[Statement, Sequence[Datum]], str]
+    about: Callable[[Statement], str]
+    aspects: Callable[[Statement, Statement], tuple[str, ...]]
+    companions: Callable[[str], Sequence[str]]
+    persistent: Callable[[Statement], bool]
+    typed: Callable[[Statement], bool]

@@ -1,0 +1,191 @@
+"""Data and routines that only got another name: recognised by their value and by their use.
+
+A point is the same under another name if it stands at the same place, or near it, and the code goes there in the same
+way. What the inline forms name after a point (FDAT, PDAT, LDAT) follows it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from respot.difference.canonical import Key, key
+from respot.difference.findings import Place, Renamed
+from respot.difference.programs import DataPair, FilePair, Side
+from respot.program.statement import Statement
+from respot.program.targets import Target
+from respot.tolerance import RENAMED_WITHIN_MM
+
+_WORD = re.compile(r"[^\W\d][\w$]*|\$\w+")
+_HERE = "<name>"
+#: A use: the routine, what the statement says without the name.
+_Use = tuple[str, Key]
+
+
+@dataclass(eq=False)
+class _Lone:
+    """A declaration of one name that only one side has."""
+
+    side: Side
+    data: DataPair
+    statement: Statement
+    name: str
+    type: str
+    value: Key
+    target: Target | None
+    uses: list[_Use] = field(default_factory=list)
+
+    @property
+    def place(self) -> Place:
+        return Place(self.side.path, self.statement.line)
+
+
+class Renames:
+    """What was renamed in a robot's programs.
+
+    Parameters
+    ----------
+    files : iterable of FilePair
+        Its files, their declarations paired by name.
+    """
+
+    def __init__(self, files: Iterable[FilePair]) -> None:
+        self._files = list(files)
+        #: what was found, in order
+        self.found: list[Renamed] = []
+        #: new name in upper case by old name
+        self.names: dict[str, str] = {}
+        self._data()
+        self._routines()
+
+    def _data(self) -> None:
+        removed = [lone for file in self._files for lone in _lones(file, file.old, removed=True)]
+        added = [lone for file in self._files for lone in _lones(file, file.new, removed=False)]
+        if not removed or not added:
+            return
+        _find_uses(removed, [file.old for file in self._files])
+        _find_uses(added, [file.new for file in self._files])
+        left_old, left_new = _Left(removed), _Left(added)
+        points = [(lone for lone in left if lone.target is not None) for left in (left_old, left_new)]
+        self._by_value(list(points[0]), list(points[1]), left_old, left_new)
+        self._by_place(left_old, left_new)
+        for old_name, new_name in list(self.names.items()):
+            self._follow(old_name, new_name, left_old, left_new)
+        self._by_value(list(left_old), list(left_new), left_old, left_new)
+
+    def _by_value(self, removed: Sequence[_Lone], added: Sequence[_Lone], left_old: _Left, left_new: _Left) -> None:
+        """Take for one what has the same type, the same value and the same uses; several of a kind in their order."""
+        buckets: dict[tuple[object, ...], tuple[list[_Lone], list[_Lone]]] = {}
+        for index, lones in enumerate((removed, added)):
+            for lone in lones:
+                if lone.target is None and not lone.uses:
+                    continue  # equal numbers that nothing uses are no evidence
+                signature = (lone.type, lone.value, tuple(sorted(lone.uses)))
+                buckets.setdefault(signature, ([], []))[index].append(lone)
+        for olds, news in buckets.values():
+            if len(olds) == len(news):
+                for old, new in zip(olds, news, strict=True):
+                    self._take(old, new, left_old, left_new)
+
+    def _by_place(self, left_old: _Left, left_new: _Left) -> None:
+        """Take for one what is used in the same way and stands near: renamed and moved at once."""
+        for old in [lone for lone in left_old if lone.target is not None and lone.uses]:
+            near = [new for new in left_new if _near(old, new)]
+            if len(near) == 1 and sum(_near(other, near[0]) for other in left_old if other.target is not None) == 1:
+                self._take(old, near[0], left_old, left_new)
+
+    def _follow(self, old_name: str, new_name: str, left_old: _Left, left_new: _Left) -> None:
+        dialect = self._files[0].old.dialect
+        pairs = zip(dialect.companions(old_name), dialect.companions(new_name), strict=True)
+        for old, new in ((left_old.named(first), left_new.named(second)) for first, second in pairs):
+            if old is not None and new is not None and old.type == new.type:
+                self._take(old, new, left_old, left_new)
+
+    def _take(self, old: _Lone, new: _Lone, left_old: _Left, left_new: _Left) -> None:
+        left_old.drop(old)
+        left_new.drop(new)
+        self.names[old.name] = new.name
+        old.data.removed = [item for item in old.data.removed if item is not old.statement]
+        new.data.added = [item for item in new.data.added if item is not new.statement]
+        new.data.pairs.append((old.statement, new.statement))
+        names = [_written(lone) for lone in (old, new)]
+        program = new.side.file.program
+        self.found.append(Renamed(names[0], names[1], new.type.lower(), program, old.place, new.place))
+
+    def _routines(self) -> None:
+        for file in self._files:
+            for old, new in file.rename_routines(self.names):
+                assert old.head is not None and new.head is not None  # noqa: S101 - a part that is paired has one
+                self.names[old.title.upper()] = new.title.upper()
+                places = (Place(file.old.path, old.head.line), Place(file.new.path, new.head.line))
+                self.found.append(Renamed(old.title, new.title, "routine", file.new.file.program, *places))
+
+
+class _Left:
+    """Declarations without a partner, in order."""
+
+    def __init__(self, lones: Iterable[_Lone]) -> None:
+        self._by_id = {id(lone): lone for lone in lones}
+        self._names: dict[str, list[_Lone]] = {}
+        for lone in self._by_id.values():
+            self._names.setdefault(lone.name, []).append(lone)
+
+    def __iter__(self) -> Iterator[_Lone]:
+        return iter(list(self._by_id.values()))
+
+    def drop(self, lone: _Lone) -> None:
+        self._by_id.pop(id(lone), None)
+
+    def named(self, name: str) -> _Lone | None:
+        """Return the one declaration of a name, None where there is none or more than one."""
+        found = [lone for lone in self._names.get(name, ()) if id(lone) in self._by_id]
+        return found[0] if len(found) == 1 else None
+
+
+def _lones(file: FilePair, side: Side, removed: bool) -> list[_Lone]:
+    found = []
+    for data in file.data:
+        for statement in data.removed if removed else data.added:
+            declared = side.declared(statement)
+            if len(declared) != 1:
+                continue
+            targets = side.index.targets_in(side.path, statement)
+            name, kind = declared[0].name, declared[0].type
+            value = key(statement, names={name: _HERE})
+            found.append(_Lone(side, data, statement, name, kind, value, targets[0] if len(targets) == 1 else None))
+    return found
+
+
+def _find_uses(lones: Sequence[_Lone], sides: Sequence[Side]) -> None:
+    """Find where the code names the declarations: a word of each statement is looked up, nothing more is read."""
+    by_name: dict[str, list[_Lone]] = {}
+    for lone in lones:
+        by_name.setdefault(lone.name, []).append(lone)
+    masked: Mapping[str, str] = dict.fromkeys(by_name, _HERE)
+    for side in sides:
+        for part in side.parts.values():
+            for statement in part.code:
+                words = {word.upper() for word in _WORD.findall(statement.source)} & by_name.keys()
+                if words:
+                    use = (part.title.upper(), key(statement, names=masked))
+                    for word in words:
+                        for lone in by_name[word]:
+                            lone.uses.append(use)
+
+
+def _near(old: _Lone, new: _Lone) -> bool:
+    before, after = old.target, new.target
+    if before is None or after is None or old.type != new.type or sorted(old.uses) != sorted(new.uses):
+        return False
+    if not before.components or not after.components:
+        return False
+    way = sum((a - b) ** 2 for a, b in zip(before.components[:3], after.components[:3], strict=True))
+    return bool(way**0.5 <= RENAMED_WITHIN_MM)
+
+
+def _written(lone: _Lone) -> str:
+    """Return the name as it is written."""
+    source = lone.statement.source
+    at = source.upper().find(lone.name)
+    return source[at : at + len(lone.name)] if at >= 0 else lone.name
