@@ -171,3 +171,22 @@ def test_a_source_in_another_convention_is_said_and_not_kept(respot, tmp_path):
     assert refused.code == 2
     assert "convention" in refused.err
     assert not (tmp_path / "cal.json").exists()
+
+
+def test_a_motor_out_of_true_is_told_by_the_ratio_in_the_machine_data(respot, tmp_path):
+    made = respot("simulate", "line", "--spots", "70", "--seed", "8", "--effect", "gear@2xmotor:0.8")
+    assert made.code == 0, made.err
+    fit = ("--measured", "line/measured.csv", "--noise", "0.1", "--effects", "joint_zero,joint_profile,gear", "--json")
+    found = respot("fit", "line/backup", *fit).json["effects"]
+    assert [(each["name"], each["where"], each["named"]) for each in found] == [("gear", {"axis": 2}, True)]
+    assert "every turn of its motor (235.12" in found[0]["remedy"]["text"]
+    # a controller that does not tell its ratios: nothing, rather than another number of waves
+    machine = next((tmp_path / "line" / "backup").rglob("$machine.dat"))
+    lines = machine.read_bytes().splitlines(keepends=True)
+    machine.write_bytes(b"".join(line for line in lines if b"RAT_MOT_AX" not in line))
+    assert respot("fit", "line/backup", *fit).json["effects"] == []
+
+
+def test_a_wheel_that_is_not_known_is_refused(respot):
+    for place in ("gear@2xwheel", "gear@9xmotor"):
+        assert respot("simulate", "line", "--effect", place).code == 2

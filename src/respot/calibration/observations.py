@@ -49,6 +49,8 @@ class Observations:
         External axis, from 0, that carries the robot along.
     columns : mapping of str to Covariate
         Every further column.
+    motor_turns : (axes,) array or None
+        Turns of the motor for a turn of each axis, NaN where not known.
     absolute_accuracy : bool
         The controller compensates the arm's own errors: effects of the arm make no sense then.
     """
@@ -64,6 +66,7 @@ class Observations:
     carried: int | None = None
     columns: Mapping[str, Covariate] = field(default_factory=dict)
     absolute_accuracy: bool = False
+    motor_turns: Array | None = None
 
     def __len__(self) -> int:
         return len(self.positions)

@@ -111,6 +111,7 @@ class SourceObservations:
             found.carried,
             self._with_approach(columns, rows),
             found.absolute_accuracy,
+            found.motor_turns,
         )
         return made
 
@@ -241,6 +242,7 @@ class SourceObservations:
             external,
             cell.track.axis if cell.track is not None else None,
             absolute_accuracy=cell.absolute_accuracy,
+            motor_turns=cell.motor_turns,
         )
 
     def _say(self, code: str, message: str, path: str) -> None:

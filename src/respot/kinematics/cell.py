@@ -46,6 +46,9 @@ class RobotCell:
         the world.
     external_axes : int
         Number of external axes.
+    motor_turns : Array or None
+        Turns of the motor for a turn of each axis, shape (axes,), NaN where it is not known or where other axes turn
+        the motor as well; None where nothing is known.
     notes : tuple of str
         What a report must say.
     """
@@ -58,6 +61,7 @@ class RobotCell:
     track: Track | None = None
     gravity: Array | None = None
     external_axes: int = 0
+    motor_turns: Array | None = None
     notes: tuple[str, ...] = ()
 
     @property

@@ -45,6 +45,8 @@ SIGNS = (-1, 1, 1, -1, 1, -1)
 #: External axes as $ETn_AX names them.
 _EXTERNAL = tuple(f"#E{n}" for n in range(1, 7))
 OFFSETS = (0.0, -90.0, 0.0, 0.0, 0.0, 0.0)
+#: Axes whose motor no other axis turns: the shafts of axes 5 and 6 run through the hand.
+_OWN_MOTOR = 4
 
 
 def kuka_cell(machine: Machine, robot: RobotModel | None = None) -> RobotCell | Reason:
@@ -82,6 +84,7 @@ def kuka_cell(machine: Machine, robot: RobotModel | None = None) -> RobotCell | 
         on_track=track is not None,
         track=track if isinstance(track, Track) else None,
         external_axes=int(count) if isinstance(count, float) else 0,
+        motor_turns=_motor_turns(values, model.axes),
         notes=tuple(notes),
     )
 
@@ -134,6 +137,17 @@ def _limits(values: Values) -> tuple[Array | None, list[str]]:
     endless = [n for n in range(1, 7) if values.get(f"$AXIS_TYPE[{n}]") == 5.0]
     limits[[n - 1 for n in endless]] = -np.inf, np.inf
     return limits, notes
+
+
+def _motor_turns(values: Values, axes: int) -> Array | None:
+    """Turns of the motor for one of each axis, (axes,), from ``$RAT_MOT_AX[n]={N numerator,D denominator}``."""
+    turns = np.full(axes, np.nan)
+    for axis in range(min(axes, _OWN_MOTOR)):
+        ratio = values.get(f"$RAT_MOT_AX[{axis + 1}]")
+        above, below = _number(ratio, "N"), _number(ratio, "D")
+        if above and below:
+            turns[axis] = abs(above / below)
+    return turns if np.isfinite(turns).any() else None
 
 
 def _track(values: Values, robroot: RigidTransform) -> Track | Reason | None:

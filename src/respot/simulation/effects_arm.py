@@ -76,9 +76,23 @@ def joint_profile(cell: Cell, rng: np.random.Generator, place: str | None) -> Ef
 
 
 def gear(cell: Cell, rng: np.random.Generator, place: str | None) -> Effect:
-    """A gear wheel out of true: once and twice in its turn, each with a phase of its own."""
-    axis = axis_of(place, rng, (1, 2, 3, 4, 5))
-    turns = int(rng.integers(6, 13))
+    """A gear wheel out of true: once and twice in its turn, each with a phase of its own; or the motor's encoder.
+
+    The place may be ``AXIS`` or ``AXISxmotor``: once and twice a turn of the motor.
+
+    Raises
+    ------
+    ValueError
+        The place is no axis, or no file of this robot tells how far its motor turns.
+    """
+    number, _, wheel = (place or "").partition("x")
+    axis = axis_of(number or None, rng, (1, 2, 3, 4, 5))
+    turns: float = int(rng.integers(6, 13))
+    if wheel:
+        ratios = cell.robot.ratios
+        if wheel != "motor" or not ratios:
+            raise ValueError(f"{place}: a wheel is motor, of a robot whose files tell its ratios")
+        turns = abs(ratios[axis - 1][0] / ratios[axis - 1][1])
     first, second = rng.uniform(0, 2 * np.pi, 2)
     part = rng.uniform(0.25, 0.45)
     angle = np.radians(cell.layout.joints[:, axis - 1])

@@ -43,6 +43,7 @@ def kuka_files(line: Line) -> dict[str, bytes]:
         "KRC/R1/Mada/$machine.dat": forms.get_template("machine.dat.j2").render(
             limits=[[real(low), real(high)] for low, high in line.robot["limits_deg"]],
             trafo=line.robot["trafo"],
+            ratios=line.robot["ratios"],
             minus_a2=real(-line.robot["a2"]),
             rail=rail,
             **robot,

@@ -299,6 +299,7 @@ def _record(spec: RobotSpec) -> dict[str, Any]:
         "name": spec.name,
         "maker": spec.maker,
         "trafo": spec.trafo,
+        "ratios": [list(ratio) for ratio in spec.ratios],
         **dict(zip(LENGTHS, (float(length) for length in spec.lengths), strict=True)),
         "offsets_deg": [float(offset) for offset in spec.offsets],
         "signs": list(spec.signs),

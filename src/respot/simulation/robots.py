@@ -31,6 +31,8 @@ class RobotSpec:
         Software limits [deg].
     trafo : str
         Model as the controller spells it.
+    ratios : tuple of (int, int)
+        Turns of the motor for a turn of each axis, numerator and denominator; empty where no file tells.
     """
 
     name: str
@@ -40,6 +42,7 @@ class RobotSpec:
     signs: tuple[int, ...]
     limits: tuple[tuple[float, float], ...]
     trafo: str
+    ratios: tuple[tuple[int, int], ...] = ()
 
     def length(self, name: str) -> float:
         """Return a length of the arm by its name [mm]."""
@@ -47,11 +50,15 @@ class RobotSpec:
 
 
 _KUKA_LIMITS = ((-185.0, 185.0), (-140.0, -5.0), (-120.0, 155.0), (-350.0, 350.0), (-125.0, 125.0), (-350.0, 350.0))
+# of the order of what such arms have; no maker's numbers
+_KUKA_RATIOS = ((-1757, 7), (-1881, 8), (-1710, 7), (-1339, 6), (-1207, 5), (-778, 5))
 _ABB_LIMITS = ((-170.0, 170.0), (-65.0, 85.0), (-180.0, 70.0), (-300.0, 300.0), (-120.0, 120.0), (-300.0, 300.0))
 
 
 def _kuka(name: str, lengths: tuple[float, ...], trafo: str) -> RobotSpec:
-    return RobotSpec(name, "kuka", lengths, (0, -90, 0, 0, 0, 0), (-1, 1, 1, -1, 1, -1), _KUKA_LIMITS, trafo)
+    return RobotSpec(
+        name, "kuka", lengths, (0, -90, 0, 0, 0, 0), (-1, 1, 1, -1, 1, -1), _KUKA_LIMITS, trafo, _KUKA_RATIOS
+    )
 
 
 def _abb(name: str, lengths: tuple[float, ...], trafo: str) -> RobotSpec:

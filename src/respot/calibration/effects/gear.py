@@ -13,6 +13,7 @@ NAME = "gear"
 PLAUSIBLE_DEG = 0.1
 LOWEST, HIGHEST = 5, 40
 """Waves per turn of the axis that are tried: fewer are a `joint_profile`; more need the ratio to be known."""
+MOTOR = "motor"
 
 
 def _terms(observations: Observations) -> list[Term]:
@@ -22,16 +23,20 @@ def _terms(observations: Observations) -> list[Term]:
     found = []
     for axis in np.flatnonzero(observations.robot.revolute):
         turns = float(np.ptp(observations.joints[:, axis])) / 360.0
-        for waves in range(LOWEST, HIGHEST + 1):
+        wheels: list[tuple[float, str]] = [(waves, "") for waves in range(LOWEST, HIGHEST + 1)]
+        if observations.motor_turns is not None and np.isfinite(observations.motor_turns[axis]):
+            wheels.append((float(observations.motor_turns[axis]), MOTOR))
+        for waves, wheel in wheels:
             if turns * waves < 1.0:  # less than one wave in the range is a profile
                 continue
             for overtones in (1, 2):
                 names = tuple(
-                    Parameter(f"{wave}_{n * waves}", "deg", PLAUSIBLE_DEG)
+                    Parameter(f"{wave}_{n * waves:g}", "deg", PLAUSIBLE_DEG)
                     for n in range(1, overtones + 1)
                     for wave in ("cos", "sin")
                 )
-                found.append(Term(NAME, {"axis": int(axis) + 1}, names, {"waves": waves, "overtones": overtones}))
+                form = {"waves": waves, "overtones": overtones, **({"wheel": wheel} if wheel else {})}
+                found.append(Term(NAME, {"axis": int(axis) + 1}, names, form))
     return found
 
 
@@ -49,10 +54,16 @@ def _remedy(term: Term, values: NDArray[np.float64]) -> Remedy:
     axis, waves = term.where["axis"], term.form["waves"]
     size = float(np.hypot(values[0], values[1]))
     text = (
-        f"The error of axis {axis} swings by {size:.4f} degrees, {waves} times a turn: a wheel of its gear runs out of "
-        "true, or its motor's encoder does. Look at the gear (noise, play, oil); until it is changed correct the "
+        f"The error of axis {axis} swings by {size:.4f} degrees, {waves:g} times a turn: a wheel of its gear runs out "
+        "of true, or its motor's encoder does. Look at the gear (noise, play, oil); until it is changed correct the "
         "points."
     )
+    if term.form.get("wheel") == MOTOR:
+        text = (
+            f"The error of axis {axis} swings by {size:.4f} degrees with every turn of its motor ({waves:.2f} to a "
+            "turn of the axis, by the machine data): look at the motor, its encoder and its coupling. A point that is "
+            "shifted stands at another angle of the motor: do not correct points for it."
+        )
     return Remedy("robot", text)
 
 
