@@ -153,10 +153,10 @@ def same(truth: Mapping[str, Any], name: str, where: Mapping[str, Any]) -> bool:
 
 def found_in(one: Trial, truth: Mapping[str, Any]) -> bool:
     """Whether a truth is named, or listed with at most 4 rivals (first, where it is the only one)."""
-    for place, claim in enumerate(one.claims[: len(one.truth)]):
-        if same(truth, claim.name, claim.where):
-            return claim.named or len(claim.rivals) <= 4 or place < 0
-    return False
+    return any(
+        same(truth, claim.name, claim.where) and (claim.named or (place < len(one.truth) and len(claim.rivals) <= 4))
+        for place, claim in enumerate(one.claims)
+    )
 
 
 def among(one: Trial, truth: Mapping[str, Any]) -> bool:
