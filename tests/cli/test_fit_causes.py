@@ -173,6 +173,24 @@ def test_a_source_in_another_convention_is_said_and_not_kept(respot, tmp_path):
     assert not (tmp_path / "cal.json").exists()
 
 
+def test_a_calibration_is_not_used_with_the_arm_of_another_robot(respot, practice, tmp_path):
+    assert fitted(respot, practice, "-o", "cal.json").code == 0
+    own = (practice / "robot.toml").read_text(encoding="utf-8")
+    line = next(line for line in own.splitlines() if line.startswith("c2"))
+    other = tmp_path / "other.toml"
+    other.write_text(own.replace(line, "c2 = 1160.0"), encoding="utf-8")
+    predict = ("predict", practice / "programmed.csv", "-c", "cal.json", "--covariates", practice / "measured.csv")
+    assert respot(*predict, "--robot", practice / "robot.toml").code == 0
+    refused = respot(*predict, "--robot", other)
+    assert refused.code == 2
+    assert "ANOTHER_ROBOT" in refused.err and "the effects were fitted with the arm of" in refused.err
+    warned = respot(*predict, "--robot", other, "--any-robot", "--json")
+    assert warned.code == 0 and "ANOTHER_SOURCE" in codes(warned)
+    measured = practice / "measured.csv"
+    validate = ("validate", practice / "programmed.csv", "--measured", measured, "-c", "cal.json", "--robot", other)
+    assert respot(*validate).code == 2
+
+
 def test_a_motor_out_of_true_is_told_by_the_ratio_in_the_machine_data(respot, tmp_path):
     made = respot("simulate", "line", "--spots", "70", "--seed", "8", "--effect", "gear@2xmotor:0.8")
     assert made.code == 0, made.err

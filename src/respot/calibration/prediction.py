@@ -17,11 +17,10 @@ from respot.calibration.covariates import covariates_of
 from respot.calibration.effects.moved import beyond, missing
 from respot.calibration.observations import Observations
 from respot.calibration.source_observations import SourceObservations
-from respot.calibration.stored import load_calibration, source_issues
+from respot.calibration.stored import arm_of, load_calibration, source_issues
 from respot.geometry import abc_from_rotation
 from respot.issues import BadInputError, Issue
 from respot.kinematics.model import RobotModel
-from respot.kinematics.robot_file import robot_from_record
 from respot.registration.rigid import transform_of
 from respot.spots import Source, is_backup, read_source, spots_of_table
 from respot.tables import Table, read_table
@@ -338,9 +337,7 @@ def seen_by(
     table = None if covariates is None else read_table(covariates, pose_needed=False)
     if not calibration.terms:
         return calibration, None, [] if table is None else [_unused(table, source)]
-    robot = options.robot
-    if robot is None and calibration.robot is not None:
-        robot = robot_from_record(calibration.robot)
+    robot, other_arm = arm_of(calibration, options.robot, str(source.path), any_robot=options.any_robot)
     gathered = SourceObservations(source, None, robot, constant=True)
     observations = gathered.of(np.arange(len(source.spots.ids)))
     if table is not None:
@@ -353,7 +350,7 @@ def seen_by(
         )
         issues.append(Issue("EFFECT_LEFT_OUT", message, str(source.path)))
     used = calibration.without(lacking)
-    return used, observations, [*gathered.issues, *issues, *beyond_range(used, observations, source)]
+    return used, observations, [*other_arm, *gathered.issues, *issues, *beyond_range(used, observations, source)]
 
 
 def beyond_range(calibration: Calibration, observations: Observations, source: Source) -> list[Issue]:

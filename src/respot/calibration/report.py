@@ -141,6 +141,7 @@ def _heldout(fit: SpotFit) -> dict[str, Any]:
         "n": int(judged.sum()),
         "before": _statistics(before[judged]),
         "after": _statistics(found.nested[judged]),
+        "after_all": _statistics(found.nested[np.isfinite(found.nested).all(axis=1)]),
         "repaired_ids": repaired,
     }
 

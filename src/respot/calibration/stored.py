@@ -6,12 +6,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from respot.calibration.calibration import Calibration, CalibrationError
+from respot.geometry import distance_mm, turn_deg
 from respot.issues import BadInputError, Issue
+from respot.kinematics.model import RobotModel
+from respot.kinematics.robot_file import robot_from_record
 from respot.program.robot import Robot
 from respot.spots import Source
 
 _SHOWN = 12
+_STANDS, _ALIKE_MM, _ALIKE_DEG = 20, 1e-3, 1e-5
 
 
 def load_calibration(path: Path) -> Calibration:
@@ -33,6 +39,45 @@ def robot_identity(robot: Robot) -> dict[str, str]:
     serial = robot.machine.facts.get("serial")
     known = {"name": robot.name, "language": robot.language, "model": robot.machine.model, "task": robot.task}
     return {**known, "serial": "" if serial is None or not serial.value.strip(" 0") else serial.value}
+
+
+def arm_of(
+    calibration: Calibration, named: RobotModel | None, path: str, *, any_robot: bool = False
+) -> tuple[RobotModel | None, list[Issue]]:
+    """Kinematics to compute the effects of a calibration with: its own, unless a robot is named.
+
+    Parameters
+    ----------
+    calibration : Calibration
+    named : RobotModel or None
+        ``--robot``.
+    path : str
+        The source, for messages.
+    any_robot : bool
+        Make a warning of the error.
+
+    Raises
+    ------
+    BadInputError
+        ``ANOTHER_ROBOT``: the named robot's lengths or zeros are not those that the effects were fitted with.
+    """
+    own = None if calibration.robot is None else robot_from_record(calibration.robot)
+    if named is None or own is None or not calibration.terms or _same_arm(own, named):
+        return own if named is None else named, []
+    message = f"the effects were fitted with the arm of {own.name}, and --robot names another, {named.name}"
+    if not any_robot:
+        advice = "leave --robot out, or say --any-robot if you know that the calibration holds for it"
+        raise BadInputError("ANOTHER_ROBOT", f"{message}; {advice}", path)
+    return named, [Issue("ANOTHER_SOURCE", message, path)]
+
+
+def _same_arm(first: RobotModel, second: RobotModel) -> bool:
+    """Whether two arms stand alike at some joints: names and limits do not matter."""
+    if first.axes != second.axes:
+        return False
+    joints = np.random.default_rng(0).uniform(-90.0, 90.0, (_STANDS, first.axes))
+    one, other = first.forward(joints), second.forward(joints)
+    return float(distance_mm(one, other).max()) < _ALIKE_MM and float(turn_deg(one, other).max()) < _ALIKE_DEG
 
 
 def source_issues(

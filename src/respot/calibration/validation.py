@@ -20,9 +20,8 @@ from respot.calibration.effects.moved import missing
 from respot.calibration.observations import Observations
 from respot.calibration.prediction import Prediction, UseOptions, beyond_range, extrapolated, predict_spots, read_for
 from respot.calibration.source_observations import SourceObservations
-from respot.calibration.stored import load_calibration
+from respot.calibration.stored import arm_of, load_calibration
 from respot.issues import BadInputError, Issue
-from respot.kinematics.robot_file import robot_from_record
 from respot.registration.errors import RegistrationError
 from respot.registration.matching import EXACT, IdMatch, match_by_name
 from respot.registration.statistics import Distances, distances
@@ -288,9 +287,7 @@ def _seen(
     """What the pairs tell for the effects of a calibration, which are left out where they do not."""
     if not calibration.terms:
         return calibration, None, []
-    robot = options.robot
-    if robot is None and calibration.robot is not None:
-        robot = robot_from_record(calibration.robot)
+    robot, other_arm = arm_of(calibration, options.robot, str(source.path), any_robot=options.any_robot)
     gathered = SourceObservations(source, reference, robot, constant=True)
     observations = gathered.of(match.source_rows, match.reference_rows)
     lacking = [term for term in calibration.terms if missing(observations, term)]
@@ -301,7 +298,7 @@ def _seen(
         for term in lacking
     ]
     used = calibration.without(lacking)
-    return used, observations, [*gathered.issues, *issues, *beyond_range(used, observations, source)]
+    return used, observations, [*other_arm, *gathered.issues, *issues, *beyond_range(used, observations, source)]
 
 
 def _pair_issues(match: IdMatch, source: Source, reference: Source) -> list[Issue]:
