@@ -191,6 +191,20 @@ def test_a_calibration_is_not_used_with_the_arm_of_another_robot(respot, practic
     assert respot(*validate).code == 2
 
 
+def test_a_column_that_cannot_be_used_is_said_with_the_reason(respot, practice, tmp_path):
+    assert fitted(respot, practice, "-o", "cal.json").code == 0
+    with (practice / "measured.csv").open(newline="") as stream:
+        rows = list(csv.reader(stream))
+    place = rows[0].index("welds_since_cap")
+    for row in rows[1::2]:
+        row[place] = "new cap"
+    with (tmp_path / "mixed.csv").open("w", newline="") as stream:
+        csv.writer(stream).writerows(rows)
+    predict = ("predict", practice / "programmed.csv", "-c", "cal.json", "--covariates", "mixed.csv")
+    result = respot(*predict, "--robot", practice / "robot.toml")
+    assert "EFFECT_LEFT_OUT" in result.err and "mixed.csv: its column welds_since_cap " in result.err
+
+
 def test_a_motor_out_of_true_is_told_by_the_ratio_in_the_machine_data(respot, tmp_path):
     made = respot("simulate", "line", "--spots", "70", "--seed", "8", "--effect", "gear@2xmotor:0.8")
     assert made.code == 0, made.err

@@ -56,6 +56,12 @@ def test_nothing_moves_by_zero_and_back_is_back(term):
     assert np.abs(again - there).max() < 1e-9
 
 
+def test_effects_that_are_too_large_to_undo_are_said():
+    term = next(term for term in terms_of(SEEN) if term.effect == "scale")
+    with pytest.raises(ValueError, match="so large"):
+        unmoved(SEEN, [term], [np.array([2500.0])], SEEN.positions)
+
+
 def test_a_joint_that_stands_wrong_moves_the_tool_as_the_arm_does():
     term = next(term for term in terms_of(SEEN) if term.effect == "joint_zero" and term.where == {"axis": 3})
     points, rotations = moved(SEEN, [term], [np.array([5.0])])

@@ -205,7 +205,11 @@ class Calibration:
         """
         wanted = (np.asarray(points, dtype=np.float64) - self.translation) @ self.rotation
         if self.terms:
-            wanted = unmoved(self._seen(wanted, rotations, observations), self.terms, self.values, wanted)
+            seen = self._seen(wanted, rotations, observations)
+            try:
+                wanted = unmoved(seen, self.terms, self.values, wanted)
+            except ValueError as error:
+                raise CalibrationError("CALIBRATION_EFFECTS", str(error)) from error
         if self.tool_offset is not None:
             if rotations is None:
                 message = "the calibration has a tool offset: it moves a spot by its orientation, which is not known"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -340,13 +340,18 @@ def seen_by(
     robot, other_arm = arm_of(calibration, options.robot, str(source.path), any_robot=options.any_robot)
     gathered = SourceObservations(source, None, robot, constant=True)
     observations = gathered.of(np.arange(len(source.spots.ids)))
+    unused: Mapping[str, str] = {}
     if table is not None:
-        observations = _joined(observations, source, table)
+        observations, unused = _joined(observations, source, table)
     lacking = [term for term in calibration.terms if missing(observations, term)]
     for term in lacking:
+        column = str(term.where.get("column", ""))
+        why = "--covariates TABLE tells columns"
+        if column in unused:
+            why = f"{covariates}: its column {column} {unused[column]}"
         message = (
-            f"{term.label} is left out: {missing(observations, term)} is not known (--covariates TABLE tells columns); "
-            "the intervals are as much wider"
+            f"{term.label} is left out: {missing(observations, term)} is not known ({why}); the intervals are as much "
+            "wider"
         )
         issues.append(Issue("EFFECT_LEFT_OUT", message, str(source.path)))
     used = calibration.without(lacking)
@@ -368,19 +373,20 @@ def beyond_range(calibration: Calibration, observations: Observations, source: S
     return issues
 
 
-def _joined(observations: Observations, source: Source, table: Table) -> Observations:
-    """Observations with the columns of a table that names all spots of the source; others are not known."""
+def _joined(observations: Observations, source: Source, table: Table) -> tuple[Observations, Mapping[str, str]]:
+    """Observations with the columns of a table that names all spots of the source, and why columns cannot be used."""
     rows = {name.casefold(): row for row, name in enumerate(table.ids)}
     order = [rows.get(name.casefold(), -1) for name in source.spots.ids]
     if min(order, default=-1) < 0:
         lost = next(name for name, row in zip(source.spots.ids, order, strict=True) if row < 0)
         raise BadInputError("NO_COMMON_IDS", f"does not name the spot {lost}; give every spot a row", table.path)
-    found, _ = covariates_of(table.columns, table.numbers, ("id", "x", "y", "z"), constant=True)
+    found, unused = covariates_of(table.columns, table.numbers, ("id", "x", "y", "z"), constant=True)
     taken = {name: column.rows(np.array(order)) for name, column in found.items()}
     measured = observations.measured_joints
     if measured is None and table.measured_joints is not None:
         measured = table.measured_joints[order]
-    return replace(observations, columns={**observations.columns, **taken}, measured_joints=measured)
+    joined = replace(observations, columns={**observations.columns, **taken}, measured_joints=measured)
+    return joined, unused
 
 
 def _unused(table: Table, source: Source) -> Issue:

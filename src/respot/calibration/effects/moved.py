@@ -16,7 +16,7 @@ from respot.calibration.observations import Observations
 Array = NDArray[np.float64]
 
 _TURNS = 20
-_STILL_MM = 1e-10
+_STILL_MM, _NEARLY_MM = 1e-10, 1e-6
 _NEAR = 1.2
 """A term holds as far as this many half ranges from the middle of what it follows."""
 
@@ -158,12 +158,20 @@ def unmoved(observations: Observations, terms: Sequence[Term], values: Sequence[
     """Positions (n, 3) that the effects move to ``wanted`` (n, 3), by fixed point; joints and columns as observed [mm].
 
     What depends on the place itself (a scale, a turn) is computed at the place found.
+
+    Raises
+    ------
+    ValueError
+        The effects are so large that the places are not found.
     """
-    found = wanted.copy()
+    found, left = wanted.copy(), np.inf
     for _ in range(_TURNS):
         there, _ = moved(observations.at(found), terms, values)
         step = wanted - there
         found = found + step
-        if float(np.abs(step).max(initial=0.0)) < _STILL_MM:
-            break
-    return found
+        left = float(np.abs(step).max(initial=0.0))
+        if left < _STILL_MM:
+            return found
+    if left < _NEARLY_MM:
+        return found
+    raise ValueError(f"the effects are so large that places are found to {left:.3g} mm only")
