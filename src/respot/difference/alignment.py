@@ -16,6 +16,8 @@ Pair = tuple[int, int]
 
 #: What occurs more often on one side is no start of a run.
 _MOST_OCCURRENCES = 64
+#: A gap slides no further to find the beginning of a group.
+_FURTHEST = 20
 #: Cells of a table that pairs what is alike, not equal.
 _MOST_CELLS = 40_000
 
@@ -129,6 +131,64 @@ def _rarest_run(old: Sequence[Hashable], new: Sequence[Hashable], within: Range)
                 length += 1
             if (count, -length) < rank:
                 best, rank = (start, other, length), (count, -length)
+    return best
+
+
+def slide(
+    pairs: Sequence[Pair],
+    items: tuple[Sequence[Hashable], Sequence[Hashable]],
+    starts: tuple[Sequence[bool], Sequence[bool]],
+) -> list[Pair]:
+    """Let what came or went begin where a group begins: if ``a b a`` became ``a``, both ``a b`` and ``b a`` went.
+
+    Parameters
+    ----------
+    pairs : sequence of Pair
+        Pairs of equal elements.
+    items : (sequence, sequence)
+        The old and the new sequence.
+    starts : (sequence of bool, sequence of bool)
+        Whether a group begins at each element.
+    """
+    partners = [dict(pairs), {new: old for old, new in pairs}]
+    for i0, i1, j0, j1 in gaps(pairs, len(items[0]), len(items[1])):
+        if i0 < i1 and j0 < j1:
+            continue
+        side = 0 if i0 < i1 else 1
+        first, last, place = (i0, i1, j0) if side == 0 else (j0, j1, i0)
+        best = _best_slide(items[side], starts[side], partners[side], (first, last, place))
+        step = 1 if best > 0 else -1
+        for _ in range(abs(best)):
+            loose, taken = (last, first) if step > 0 else (first - 1, last - 1)
+            other = partners[side].pop(loose)
+            partners[side][taken] = other
+            partners[1 - side][other] = taken
+            first, last = first + step, last + step
+    return sorted(partners[0].items())
+
+
+def _best_slide(
+    items: Sequence[Hashable], starts: Sequence[bool], partners: dict[int, int], gap: tuple[int, int, int]
+) -> int:
+    """Return how far to move a gap so that a group begins at its start and behind its end."""
+    first, last, place = gap
+
+    def worth(by: int) -> int:
+        return int(starts[first + by]) + int(last + by == len(items) or starts[last + by])
+
+    best = 0
+    for step in (-1, 1):
+        by = 0
+        while abs(by) < _FURTHEST:
+            edge = first + by - 1 if step < 0 else last + by
+            same = edge + last - first if step < 0 else edge - last + first
+            if not 0 <= edge < len(items) or partners.get(edge) != place + by - (step < 0):
+                break
+            if items[edge] != items[same]:
+                break
+            by += step
+            if worth(by) > worth(best):
+                best = by
     return best
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from respot.difference.canonical import Key
 from respot.difference.programs import CodePair, FilePair
 
-#: A single statement is a block if it has so many tokens and occurs nowhere else among what came and went.
+#: A single statement is a block if it is about one of these, has so many tokens, and occurs nowhere else among what
+#: came and went: in its file, or in the robot if it went to another file. A form's other statements are all alike.
+_TELLING = frozenset(("motion", "weld", "io", "call"))
 _TELLING_TOKENS = 3
 
 
@@ -54,10 +57,7 @@ def moved_blocks(files: Iterable[FilePair]) -> list[Block]:
     for run_index, run in enumerate(added):
         for offset, found in enumerate(run.keys):
             places.setdefault(found, []).append((run_index, offset))
-    counts: dict[Key, int] = {}
-    for run in removed:
-        for found in run.keys:
-            counts[found] = counts.get(found, 0) + 1
+    counts = [_counts(runs) for runs in (removed, added)]
     candidates = sorted(
         (candidate for run in removed for candidate in _candidates(run, added, places)),
         key=lambda candidate: -candidate[-1],
@@ -67,7 +67,11 @@ def moved_blocks(files: Iterable[FilePair]) -> list[Block]:
         target = added[target_index]
         if length == 1:
             single = run.keys[start]
-            if len(single) < _TELLING_TOKENS or counts[single] > 1 or len(places[single]) > 1:
+            about = run.file.old.dialect.about(run.pair.old.code[run.start + start])
+            scope = id(run.file) if run.file is target.file else 0
+            if about not in _TELLING or len(single) < _TELLING_TOKENS:
+                continue
+            if any(count[scope, single] > 1 for count in counts):
                 continue
         olds = range(run.start + start, run.start + start + length)
         news = range(target.start + target_start, target.start + target_start + length)
@@ -77,6 +81,16 @@ def moved_blocks(files: Iterable[FilePair]) -> list[Block]:
         target.pair.moved_new.update(news)
         blocks.append(Block(run.file, target.file, run.pair, target.pair, olds[0], news[0], length))
     return blocks
+
+
+def _counts(runs: Iterable[_Run]) -> Counter[tuple[int, Key]]:
+    """Count each statement of some runs in its file, by the identity of the file, and in the robot, by 0."""
+    found: Counter[tuple[int, Key]] = Counter()
+    for run in runs:
+        for single in run.keys:
+            found[id(run.file), single] += 1
+            found[0, single] += 1
+    return found
 
 
 def _candidates(

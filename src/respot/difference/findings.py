@@ -142,7 +142,7 @@ class Renamed:
     old_name, new_name : str
         Its names.
     type : str
-        Declared type, or ``routine``.
+        Declared type, or what kind of routine or record it is.
     program : str
         Where it lives.
     old, new : Place

@@ -10,6 +10,7 @@ from respot.backups import Backup
 from respot.issues import BadInputError, Issue
 from respot.program.robot import Robot
 
+_NUMBERED = re.compile(r"TASK\d+", re.IGNORECASE)
 _TASK = re.compile(r"(?:^|/)(task\d+)/", re.IGNORECASE)
 RobotPair = tuple[Robot | None, Robot | None]
 PathPair = tuple[str, str]
@@ -49,8 +50,9 @@ def pair_robots(old: Backup, new: Backup, name: str | None = None) -> tuple[list
         )
         raise BadInputError("DIFFERENT_ROBOTS", message, str(new.path))
     left_old, left_new = list(sides[0]), list(sides[1])
+    tasks = _Tasks(old, new)
     pairs: list[tuple[Robot, Robot]] = []
-    for same in (_same_name, _same_serial, _same_task, _only_one):
+    for same in (tasks.same_name, _same_serial, tasks.same_task, _only_one):
         pairs += _matched(left_old, left_new, same)
     issues = [issue for pair in pairs if (issue := _doubt(*pair)) is not None]
     if not pairs:
@@ -82,9 +84,38 @@ def _matched(left_old: list[Robot], left_new: list[Robot], same: _Same) -> list[
     return found
 
 
-def _same_name(old: Robot, new: Robot, left_old: Sequence[Robot], left_new: Sequence[Robot]) -> bool:
-    del left_old, left_new
-    return old.language == new.language and old.name.lower() == new.name.lower()
+class _Tasks:
+    """Compares robots by name and task; a task that is only known by its number is known by its modules."""
+
+    def __init__(self, old: Backup, new: Backup) -> None:
+        self._sides = (old, new)
+        self._folders: dict[tuple[str, str], dict[str, str]] = {}
+
+    def same_name(self, old: Robot, new: Robot, left_old: Sequence[Robot], left_new: Sequence[Robot]) -> bool:
+        """Compare names."""
+        del left_old, left_new
+        if old.language != new.language:
+            return False
+        if _NUMBERED.fullmatch(old.task) and _NUMBERED.fullmatch(new.task):
+            controllers = [robot.name.removesuffix(robot.task).lower() for robot in (old, new)]
+            return controllers[0] == controllers[1] and self._same_number(old, new)
+        return old.name.lower() == new.name.lower()
+
+    def same_task(self, old: Robot, new: Robot, left_old: Sequence[Robot], left_new: Sequence[Robot]) -> bool:
+        """Compare tasks of one controller on each side, such as two backups of it that are named otherwise."""
+        one = len({robot.root for robot in left_old}) == 1 == len({robot.root for robot in left_new})
+        if not (one and old.task and new.task):
+            return False
+        if _NUMBERED.fullmatch(old.task) and _NUMBERED.fullmatch(new.task):
+            return self._same_number(old, new)
+        return old.task.lower() == new.task.lower()
+
+    def _same_number(self, old: Robot, new: Robot) -> bool:
+        place = (old.root, new.root)
+        if place not in self._folders:
+            files = [side.files_of(robot) for side, robot in zip(self._sides, (old, new), strict=True)]
+            self._folders[place] = _task_folders(*files)
+        return self._folders[place].get(old.task.lower()) == new.task.lower()
 
 
 def _same_serial(old: Robot, new: Robot, left_old: Sequence[Robot], left_new: Sequence[Robot]) -> bool:
@@ -92,12 +123,6 @@ def _same_serial(old: Robot, new: Robot, left_old: Sequence[Robot], left_new: Se
     serials = [robot.machine.facts.get("serial") for robot in (old, new)]
     known = [serial.value for serial in serials if serial is not None]
     return old.language == new.language and len(known) == 2 and known[0] == known[1]
-
-
-def _same_task(old: Robot, new: Robot, left_old: Sequence[Robot], left_new: Sequence[Robot]) -> bool:
-    """Compare tasks of one controller on each side, such as two backups of it that are named otherwise."""
-    one = len({robot.root for robot in left_old}) == 1 == len({robot.root for robot in left_new})
-    return one and bool(old.task) and old.task.lower() == new.task.lower()
 
 
 def _only_one(old: Robot, new: Robot, left_old: Sequence[Robot], left_new: Sequence[Robot]) -> bool:

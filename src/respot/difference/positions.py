@@ -97,8 +97,8 @@ class Comparer:
         small = {name: change for name, change in axes.items() if self._small(change, name)}
         axes = {name: change for name, change in axes.items() if name not in small}
         world, (before, after) = self._world(uses, old, new)
-        if shift is None and all(self._same_base(*pair) for pair in uses):
-            world = None  # digits that no controller holds
+        if shift is None and world is not None and all(self._same_base(*pair) for pair in uses):
+            world = Shift(0.0, 0.0, 0.0)  # digits that no controller holds
         lost = not same_text and bool(old.components) != bool(new.components)
         still = self._tolerance.holds(shift) and self._tolerance.holds(world)
         if still and not configuration and not axes and not lost:

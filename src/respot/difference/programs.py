@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
-from respot.difference.alignment import Pair, Range, align, gaps, pair_alike
+from respot.difference.alignment import Pair, Range, align, gaps, pair_alike, slide
 from respot.difference.canonical import TARGET, Key, key
 from respot.difference.dialect import Datum, Dialect
 from respot.difference.index import Index
@@ -125,7 +126,7 @@ class FilePair:
             waiting: dict[tuple[str, ...], list[Statement]] = {}
             for statement in data.removed:
                 waiting.setdefault(self._identity(self.old, statement), []).append(statement)
-            added, data.pairs = [], []
+            added = []
             for statement in data.added:
                 found = waiting.get(self._identity(self.new, statement))
                 if found:
@@ -160,14 +161,13 @@ class FilePair:
     def align_code(self) -> None:
         """Pair the statements of every routine by what they say."""
         for old, new in self.parts:
-            pair = CodePair(old, new, align(texts(old.code), texts(new.code)))
-            for i0, i1, j0, j1 in pair.gaps():
-                keys = (
-                    [self.old.key(statement) for statement in old.code[i0:i1]],
-                    [self.new.key(statement) for statement in new.code[j0:j1]],
-                )
-                pair.pairs += [(i0 + i, j0 + j) for i, j in align(*keys)]
-            pair.pairs.sort()
+            starts = _group_starts(old.code), _group_starts(new.code)
+            written = texts(old.code), texts(new.code)
+            pair = CodePair(old, new, slide(align(*written), written, starts))
+            if any(i0 < i1 and j0 < j1 for i0, i1, j0, j1 in pair.gaps()):
+                # some may only be spelled otherwise: what is written the same alone would be paired too eagerly
+                keys = [self.old.key(item) for item in old.code], [self.new.key(item) for item in new.code]
+                pair.pairs = slide(align(*keys), keys, starts)
             self.code.append(pair)
 
     def pair_edited(self) -> None:
@@ -214,6 +214,12 @@ class FilePair:
             return 0.0
         way = sum((a - b) ** 2 for a, b in zip(before[0].components[:3], after[0].components[:3], strict=True))
         return float(1.0 / (1.0 + way**0.5 / 10.0))
+
+
+def _group_starts(statements: Sequence[Statement]) -> list[bool]:
+    """Whether a comment, a fold or an empty line stands above each statement: an inline form begins there."""
+    lines = [-1, *(statement.line for statement in statements)]
+    return [line > before + 1 for before, line in pairwise(lines)]
 
 
 def _pair_written(old: Part, new: Part) -> DataPair:

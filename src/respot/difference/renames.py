@@ -72,7 +72,15 @@ class Renames:
         self._by_place(left_old, left_new)
         for old_name, new_name in list(self.names.items()):
             self._follow(old_name, new_name, left_old, left_new)
-        self._by_value(list(left_old), list(left_new), left_old, left_new)
+        # what is named after a point is renamed with it or not at all: its values are those of many
+        forms = {
+            name
+            for lone in (*removed, *added)
+            if lone.target is not None
+            for name in self._files[0].old.dialect.companions(lone.name)
+        }
+        rest = [[lone for lone in left if lone.name not in forms] for left in (left_old, left_new)]
+        self._by_value(rest[0], rest[1], left_old, left_new)
 
     def _by_value(self, removed: Sequence[_Lone], added: Sequence[_Lone], left_old: _Left, left_new: _Left) -> None:
         """Take for one what has the same type, the same value and the same uses; several of a kind in their order."""
@@ -119,7 +127,7 @@ class Renames:
                 assert old.head is not None and new.head is not None  # noqa: S101 - a part that is paired has one
                 self.names[old.title.upper()] = new.title.upper()
                 places = (Place(file.old.path, old.head.line), Place(file.new.path, new.head.line))
-                self.found.append(Renamed(old.title, new.title, "routine", file.new.file.program, *places))
+                self.found.append(Renamed(old.title, new.title, new.head.kind, file.new.file.program, *places))
 
 
 class _Left:
