@@ -14,6 +14,7 @@ from respot.calibration.discovery.evening import evening
 from respot.calibration.discovery.heldout import HeldOut, folds_of, heldout
 from respot.calibration.discovery.joint_fit import SCALE_FLOOR, JointFit, fit_jointly
 from respot.calibration.discovery.outliers import judged, misfit, settled
+from respot.calibration.discovery.refinement import refined
 from respot.calibration.discovery.rivals import RivalTable, rival_table
 from respot.calibration.discovery.selection import Selection, State
 from respot.calibration.discovery.significance import DRAWS
@@ -131,6 +132,20 @@ class _Search:
         columns = columns_of(self.observations.tipped(tip), self.terms)
         aliases, allowed = _choices(self.terms, columns, self.observations.positions)
         return replace(self, tip=tip, columns=columns, aliases=aliases, allowed=allowed)
+
+    def refined(self, chosen: Sequence[int], fit: JointFit) -> _Search:
+        """The same with the constants of some terms' forms as a fit of them has them; itself where they are near."""
+        better = refined(fit, self.observations)
+        if better == fit.terms:
+            return self
+        terms, columns = list(self.terms), self.columns.copy()
+        stops = np.cumsum([0, *(len(term.parameters) for term in terms)])
+        for index, term in zip(chosen, better, strict=True):
+            if term != terms[index]:
+                terms[index] = term
+                own = columns_of(self.observations.tipped(self.tip), [term])
+                columns[:, :, int(stops[index]) : int(stops[index + 1])] = own
+        return replace(self, terms=tuple(terms), columns=columns)
 
 
 @dataclass(frozen=True, eq=False)
@@ -266,7 +281,7 @@ def _aliases_of_tool(terms: Sequence[Term], columns: Array) -> tuple[int, ...]:
 
 def _settle(search: _Search, inliers: Mask, draws: int) -> _Found:
     """Search, fit, judge outliers by the model, and search again until nothing changes."""
-    seen: set[tuple[bytes, tuple[int, ...]]] = set()
+    seen: list[tuple[bytes, tuple[Term, ...]]] = []
     fit = fit_jointly(search.observations, search.reference, (), inliers)
     printing = fit.sigma <= SCALE_FLOOR  # what is finer than a micrometre has no cause
     found: _Found | None = None
@@ -279,15 +294,20 @@ def _settle(search: _Search, inliers: Mask, draws: int) -> _Found:
         state = selection.search(start) if judged else selection.state((), 0.0)
         chosen = tuple(sorted(state.chosen))
         fit = fit_jointly(search.observations, search.reference, [search.terms[i] for i in chosen], inliers)
+        refining = search.refined(chosen, fit)
+        if refining is not search:
+            search = refining
+            fit = fit_jointly(search.observations, search.reference, [search.terms[i] for i in chosen], inliers)
+            selection = _selection(search, fit, draws, even)
         found = _Found(search, selection, selection.state(chosen, selection.sigma(state)), fit)
         inliers = settled(fit)
-        key = (np.packbits(inliers).tobytes(), chosen)
+        key = (np.packbits(inliers).tobytes(), tuple(search.terms[i] for i in chosen))
         # once more where the noise turns out not to be alike along all axes
         tip = tip_of(fit.terms, fit.values)
         there = not np.any(tip) or float(np.abs(tip - search.tip).max()) <= _FAR_MM / 2.0
         if key in seen and (even is not None) == (fit.noise is not None) and there:
             break
-        seen.add(key)
+        seen.append(key)
         if not there:
             search = search.at(tip)
         if not np.array_equal(inliers, fit.inliers):

@@ -13,7 +13,7 @@ from respot.calibration.observations import Observations
 
 NAME = "covariate"
 PLAUSIBLE_MM = 5.0
-_SATURATING = (0.08, 0.2, 0.5)
+_SATURATING, _NEXT = (0.08, 0.2, 0.5), 1.6
 _WAVES = tuple(0.5 * halves for halves in range(3, 17))
 _WAVES_IN_TIME = tuple(0.25 * quarters for quarters in range(6, 97))
 """Waves over the range of a column; what repeats in time (air conditioning, shifts) is told more finely."""
@@ -85,6 +85,15 @@ def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
     return along(even)
 
 
+def _constants(term: Term) -> dict[str, tuple[float, float]]:
+    shape = term.form.get("shape")
+    if shape == "saturating":
+        return {"scale": (term.form["scale"] / _NEXT, term.form["scale"] * _NEXT)}
+    if shape == "periodic":
+        return {"waves": (term.form["waves"] - 0.25, term.form["waves"] + 0.25)}
+    return {}
+
+
 def _at_middle(term: Term) -> float:
     middle = float(term.form["middle"])
     if term.form["shape"] == "saturating":
@@ -113,4 +122,5 @@ MECHANISM = Mechanism(
     needs="a further column",
     separates="the same spots measured at both ends of the column",
     points=True,
+    constants=_constants,
 )

@@ -13,10 +13,11 @@ DRIFT, WARMUP = "drift", "warmup"
 FAMILY = "time"
 PLAUSIBLE_MM, PLAUSIBLE_DEG = 3.0, 0.2
 _SHARES = (0.03, 0.05, 0.08, 0.12, 0.18, 0.27, 0.4, 0.6)
+"""Time constants that are tried, as shares of the measuring time."""
+_NEXT = 1.5
+"""From one of them to the next."""
 _SECOND = (3.0, 8.0)
 """A motor warms faster than the arm: a second time constant is so many times the first."""
-
-"""Time constants that are tried, as shares of the measuring time."""
 
 
 def _terms(observations: Observations, name: str) -> list[Term]:
@@ -77,6 +78,11 @@ def _shares(observations: Observations, term: Term) -> list[NDArray[np.float64]]
     return [share, share ** term.form["power"]] if "power" in term.form else [share]
 
 
+def _constants(term: Term) -> dict[str, tuple[float, float]]:
+    names = [name for name in ("time_constant", "second_time_constant") if name in term.form]
+    return {name: (term.form[name] / _NEXT, term.form[name] * _NEXT) for name in names}
+
+
 def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:
     centre = np.array(term.form["centre"])
     columns = [motion_about(observations.positions, share, centre) for share in _shares(observations, term)]
@@ -115,6 +121,7 @@ MECHANISMS = tuple(
         needs="a column with the time",
         separates=_SEPARATES,
         turns=_turns,
+        constants=_constants,
     )
     for name in (DRIFT, WARMUP)
 )

@@ -133,6 +133,8 @@ class Mechanism:
         It describes a shape and is no cause: it comes after all that may be one, and is never named.
     points : bool
         It tells where to look for the cause and is none itself: it is never named.
+    constants : callable, optional
+        Of a term: constants of its form that may be refined, each with the least and the largest value to look at.
     many : bool
         It has so many parameters that it comes near to almost any noise: it is never named.
     """
@@ -148,6 +150,7 @@ class Mechanism:
     describes: bool = False
     points: bool = False
     many: bool = False
+    constants: Callable[[Term], Mapping[str, tuple[float, float]]] | None = None
 
     def shifts(self, observations: Observations, term: Term) -> Array:
         """Shifts of the TCP (n, 3, k) in the source frame per unit of each parameter [mm], to first order."""
