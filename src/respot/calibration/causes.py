@@ -11,13 +11,15 @@ from scipy.spatial.transform import Rotation
 
 from respot.calibration.discovery.discover import LEAST_SPOTS, Discovery, discover
 from respot.calibration.discovery.records import effects_of
-from respot.calibration.effects import EFFECTS, convention, swapped_ids, tool_offset
+from respot.calibration.effects import EFFECTS, convention, group_shift, swapped_ids, tool_offset, wrong_frame
 from respot.calibration.effects.catalogue import MECHANISMS
 from respot.calibration.effects.convention import ConventionTrial, investigate_convention
 from respot.calibration.effects.convention_tool import investigate_by_tool
+from respot.calibration.effects.moved import moved
 from respot.calibration.effects.readings import Columns, reread
 from respot.calibration.effects.search import Effects, search_effects
 from respot.calibration.effects.tool_offset import ToolTrial
+from respot.calibration.effects.wrong_frame_search import FrameSearch, find_wrong_frames
 from respot.calibration.observations import Observations
 from respot.registration.errors import RegistrationError
 from respot.registration.exchanged import ExchangeResult, find_exchanged
@@ -25,6 +27,7 @@ from respot.registration.robust import fit_robust
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
+_WITH_FRAMES = "where a frame is wrong, the tool is judged among all other effects"
 Observe = Callable[[Rows], Observations]
 """Observations of the pairs, for a permutation (n,) of the reference's rows: names that are exchanged back."""
 
@@ -56,6 +59,8 @@ class Causes:
         Tool orientations of the source, read as a named convention has it.
     convention : ConventionTrial or None
         Whether a list writes its orientations in another way, where that was asked.
+    frames : FrameSearch or None
+        Listed frames in the place of written ones, where that was asked; their terms are the first of the discovery's.
     """
 
     exchanged: ExchangeResult
@@ -64,12 +69,13 @@ class Causes:
     observations: Observations | None = None
     rotations: Rotation | None = None
     convention: ConventionTrial | None = None
+    frames: FrameSearch | None = None
 
     @property
     def in_model(self) -> Discovery | None:
         """The discovery, if its effects are the model."""
         alone = self.trial is not None and self.trial.accepted
-        return self.discovery if self.discovery is not None and self.discovery.accepted and not alone else None
+        return self.discovery if self.discovery is not None and self.discovery.fit.terms and not alone else None
 
 
 def every_effect() -> tuple[str, ...]:
@@ -108,6 +114,7 @@ def find_causes(
     written: Written | None = None,
     nested: bool = True,
     progress: Callable[[], None] = lambda: None,
+    same_frame: bool = False,
 ) -> Causes:
     """Look for causes among paired spots.
 
@@ -126,6 +133,8 @@ def find_causes(
         As `respot.calibration.discovery.discover.discover`.
     progress : callable
         Called as the work goes on.
+    same_frame : bool
+        Whether both coordinate systems claim to be the same.
 
     Raises
     ------
@@ -133,6 +142,80 @@ def find_causes(
         As `names_of` and `search_effects`.
     """
     looked_for, written = names_of(effects), written or Written()
+
+    def causes(frames: FrameSearch | None) -> Causes:
+        return _causes(
+            ids,
+            source,
+            reference,
+            rotations,
+            effects,
+            observe,
+            frames if frames is not None and frames.terms else None,
+            kind=kind,
+            noise=noise,
+            seed=seed,
+            reference_rotations=reference_rotations,
+            written=written,
+            nested=nested,
+            progress=progress,
+        )
+
+    if wrong_frame.NAME not in looked_for or observe is None:
+        return causes(None)
+    every = np.arange(len(ids), dtype=np.intp)
+    seen = replace(observe(every), positions=source, rotations=rotations)
+    frames = find_wrong_frames(seen, reference, same_frame=same_frame, seed=seed)
+    found = causes(frames)
+    # what other effects hide may be a listed frame as well: a group that they leave moved as a body
+    beside = _beside(found)
+    if beside is None:
+        return replace(found, frames=frames)
+    repaired = reference[found.exchanged.permutation]
+    more = find_wrong_frames(
+        frames.observations, repaired, same_frame=same_frame, seed=seed, beside=beside, before=frames.terms
+    )
+    if not more.terms:
+        return replace(found, frames=replace(frames, unproved=more.unproved))
+    both = replace(more, terms=(*frames.terms, *more.terms), effects=(*frames.effects, *more.effects))
+    return replace(causes(both), frames=both)
+
+
+def _beside(found: Causes) -> Array | None:
+    """Shifts (n, 3) by all effects but moved groups, where there are such groups; None where there are none [mm]."""
+    discovery, seen = found.in_model, found.observations
+    if discovery is None or seen is None:
+        return None
+    pairs = list(zip(discovery.fit.terms, discovery.fit.values, strict=True))
+    if all(term.effect != group_shift.NAME for term, _ in pairs):
+        return None
+    others = [(term, value) for term, value in pairs if term.effect not in (group_shift.NAME, wrong_frame.NAME)]
+    places, _ = moved(seen, [term for term, _ in others], [value for _, value in others])
+    return places - seen.positions
+
+
+def _causes(
+    ids: Sequence[str],
+    source: Array,
+    reference: Array,
+    rotations: Rotation | None,
+    effects: Effects,
+    observe: Observe | None,
+    frames: FrameSearch | None,
+    *,
+    kind: str,
+    noise: float | None,
+    seed: int,
+    reference_rotations: Rotation | None,
+    written: Written,
+    nested: bool,
+    progress: Callable[[], None],
+) -> Causes:
+    """As `find_causes`, with the spots where proved frames put them."""
+    as_given = rotations
+    if frames is not None:
+        source, rotations = frames.observations.positions, frames.observations.rotations
+    looked_for = names_of(effects)
     simple: Effects = "auto" if effects == "auto" else tuple(name for name in looked_for if name in EFFECTS)
     exchanged, trial = search_effects(ids, source, reference, rotations, simple, kind=kind, noise=noise, seed=seed)
     reading = None
@@ -144,14 +227,16 @@ def find_causes(
             exchanged, trial = search_effects(
                 ids, source, reference, rotations, simple, kind=kind, noise=noise, seed=seed
             )
-    others = frozenset(name for name in looked_for if name in MECHANISMS)
-    if others <= {tool_offset.NAME} or len(ids) < LEAST_SPOTS:
+    others = frozenset(name for name in looked_for if name in MECHANISMS and name != wrong_frame.NAME)
+    if frames is None and (others <= {tool_offset.NAME} or len(ids) < LEAST_SPOTS):
         return Causes(exchanged, trial, rotations=rotations, convention=reading)
 
     def look(names: ExchangeResult) -> tuple[Discovery, Observations]:
         seen = Observations(source, rotations)
         if observe is not None:
-            seen = replace(observe(names.permutation), rotations=rotations)
+            seen = replace(observe(names.permutation), positions=source, rotations=rotations)
+        if frames is not None and frames.observations.joints is None:
+            seen = replace(seen, joints=None, measured_joints=None)
         repaired = reference[names.permutation]
         start = names.robust.inliers
         found = discover(
@@ -172,6 +257,11 @@ def find_causes(
         if not np.array_equal(again.permutation, exchanged.permutation):
             exchanged = again
             found, seen = look(exchanged)
+    if frames is not None:
+        none = (np.zeros(0),) * len(frames.terms)
+        fit = replace(found.fit, terms=(*frames.terms, *found.fit.terms), values=(*none, *found.fit.values))
+        trial = None if trial is None else replace(trial, accepted=False, effect=None, verdict=_WITH_FRAMES)
+        return Causes(exchanged, trial, replace(found, fit=fit), seen, as_given, reading, frames)
     settled = _settled(ids, source, reference, exchanged, trial, found, looked_for, seed)
     return Causes(*settled, found, seen, rotations, reading)
 

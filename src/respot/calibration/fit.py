@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,11 +13,12 @@ from scipy.spatial.transform import Rotation
 from respot.calibration.calibration import Calibration, Frame, Kind
 from respot.calibration.causes import Causes, Observe, Written, find_causes
 from respot.calibration.discovery.records import effects_of as discovered_effects
-from respot.calibration.effects import swapped_ids, tool_offset
+from respot.calibration.effects import group_shift, swapped_ids, tool_offset
 from respot.calibration.effects.effect import Effect
 from respot.calibration.effects.orientations import OrientationFit, compare_orientations
 from respot.calibration.effects.readings import reread
 from respot.calibration.effects.search import RIGID_ONLY, Effects
+from respot.calibration.effects.term import Term
 from respot.calibration.final_model import FinalModel, final_model
 from respot.calibration.methods import affine_fit, paper_fit
 from respot.calibration.pairs import DEFAULT_FRAME, LEAST_PAIRS, Asked, Listed, PairedObserve, Pairs, pair_lists
@@ -252,6 +254,7 @@ def _fit(pairs: Pairs, asked: Asked) -> SpotFit:
         written=asked.written,
         nested=asked.nested,
         progress=asked.progress,
+        same_frame=asked.same_frame,
     )
     repaired = pairs.reference[causes.exchanged.permutation]
     turned = _read_again(pairs, causes)
@@ -314,12 +317,25 @@ def _collected(pairs: Pairs, asked: Asked, causes: Causes, model: FinalModel, re
 
 def _effects_of(pairs: Pairs, asked: Asked, causes: Causes) -> tuple[Effect, ...]:
     found = swapped_ids.effects_of(causes.exchanged, pairs.ids, pairs.reference, kind=asked.kind)
+    if causes.frames is not None:
+        found = (*found, *causes.frames.effects)
     reading, trial = causes.convention, causes.trial
     if reading is not None and reading.finding is not None:
         found = (*found, reading.finding.effect)
     if trial is not None and trial.effect is not None:
         found = (*found, trial.effect)
-    return found if causes.in_model is None else (*found, *discovered_effects(causes.in_model))
+    if causes.in_model is None:
+        return found
+    doubts = () if causes.frames is None else causes.frames.unproved
+    return (*found, *(_doubted(effect, doubts) for effect in discovered_effects(causes.in_model)))
+
+
+def _doubted(effect: Effect, doubts: Sequence[Term]) -> Effect:
+    """A moved group that a listed frame would explain as well, though chance may meet it, is not named."""
+    rivals = tuple(term.label for term in doubts if effect.name == group_shift.NAME)
+    if not rivals:
+        return effect
+    return replace(effect, named=False, not_separated_from=(*effect.not_separated_from, *rivals))
 
 
 def _notes(pairs: Pairs, asked: Asked, model: FinalModel) -> tuple[Note, ...]:
@@ -363,6 +379,8 @@ def _calibration_of(causes: Causes, model: FinalModel, names: tuple[str, ...], a
 
 def _orientations(model: FinalModel, pairs: Pairs, causes: Causes, asked: Asked) -> OrientationFit | None:
     source, reference, written = pairs.source_rotations, pairs.reference_rotations, asked.written or Written()
+    if causes.frames is not None and causes.frames.terms:
+        source = causes.frames.observations.rotations
     if source is None or reference is None:
         return None
     rows = np.flatnonzero(model.robust.inliers)

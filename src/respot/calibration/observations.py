@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from respot.calibration.covariates import Covariate
+from respot.calibration.spot_frames import SpotFrames
 from respot.geometry import IDENTITY
 from respot.kinematics.gravity import gravity_basis
 from respot.kinematics.model import RobotModel
@@ -53,6 +54,8 @@ class Observations:
         Turns of the motor for a turn of each axis, NaN where not known.
     absolute_accuracy : bool
         The controller compensates the arm's own errors: effects of the arm make no sense then.
+    frames : SpotFrames or None
+        The tools and bases that the spots of a backup name.
     """
 
     positions: Array
@@ -67,6 +70,7 @@ class Observations:
     columns: Mapping[str, Covariate] = field(default_factory=dict)
     absolute_accuracy: bool = False
     motor_turns: Array | None = None
+    frames: SpotFrames | None = None
 
     def __len__(self) -> int:
         return len(self.positions)
@@ -83,6 +87,7 @@ class Observations:
             base2source=self.base2source[rows] if several else self.base2source,
             external_axes=None if self.external_axes is None else self.external_axes[rows],
             columns={name: column.rows(rows) for name, column in self.columns.items()},
+            frames=None if self.frames is None else self.frames.rows(rows),
         )
 
     def at(self, positions: Array) -> Observations:

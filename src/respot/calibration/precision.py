@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from respot.calibration.effects import wrong_frame
 from respot.calibration.region import outside
 from respot.registration.covariance import jacobian
 from respot.registration.statistics import rms
@@ -297,10 +298,14 @@ def _with_effects(fit: SpotFit, found: Discovery, residuals: Array) -> Precision
     free = float(found.fit.free * direction_share(noise))
     centroid = fit.calibrated[inliers].mean(axis=0)
     scatter, start = [], 6
-    for value in found.fit.values:
+    for term, value in zip(found.fit.terms, found.fit.values, strict=True):
         stop = start + len(value)
         columns = found.fit.columns[inliers][:, :, start:stop] / found.fit.priors[start - 6 : stop - 6]
         shifts = columns @ value @ found.fit.rotation.T
+        if term.effect == wrong_frame.NAME and fit.observations is not None:  # it has no parameter
+            written = replace(fit.observations, positions=fit.source, rotations=fit.source_rotations)
+            there = wrong_frame.at_frames(written, [term]).positions
+            shifts = (there - fit.source)[inliers] @ found.fit.rotation.T
         scatter.append(_symmetric(shifts.T @ shifts / len(shifts)))
         start = stop
     return Precision(

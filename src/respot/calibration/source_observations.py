@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from scipy.spatial.transform import RigidTransform
 
 from respot.calibration.covariates import Covariate, covariates_of
 from respot.calibration.observations import Observations
+from respot.calibration.spot_frames import spot_frames
 from respot.geometry import IDENTITY
 from respot.issues import Issue
 from respot.kinematics.cell import Reason, RobotCell
@@ -74,7 +75,9 @@ class SourceObservations:
             self._all = self._of_table(plain, self.source.table)
         else:
             self._all = plain
-        self._own = self._columns(self.source)
+        if self.source.robot is not None:
+            self._all = replace(self._all, frames=spot_frames(self.source.robot, list(spots.moves)))
+        self._own = {**self._named(), **self._columns(self.source)}
         self._other = {} if self.reference is None else self._columns(self.reference)
 
     def of(self, source_rows: Sequence[int] | Rows, reference_rows: Sequence[int] | Rows | None = None) -> Observations:
@@ -112,8 +115,21 @@ class SourceObservations:
             self._with_approach(columns, rows),
             found.absolute_accuracy,
             found.motor_turns,
+            found.frames,
         )
         return made
+
+    def _named(self) -> dict[str, Covariate]:
+        """Program, base and tool of each spot of a backup as groups; of columns with the same groups the first."""
+        frames = self._all.frames
+        found: dict[str, Covariate] = {}
+        known: list[list[int]] = []
+        for name, labels in ({} if frames is None else frames.columns).items():
+            groups = [labels.index(label) for label in labels]
+            if self.constant or (len(set(groups)) > 1 and groups not in known):
+                found[name] = Covariate(name, "group", None, labels)
+                known.append(groups)
+        return found
 
     def _columns(self, source: Source) -> dict[str, Covariate]:
         table = source.table

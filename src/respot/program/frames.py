@@ -29,6 +29,8 @@ class Frame:
         It is the world itself (base 0, wobj0) or the flange (tool 0, tool0).
     held : bool
         The robot carries it. A held base and a fixed tool make an external TCP.
+    user : RigidTransform or None
+        Of a work object: its user frame, ``uframe2world``; the rest of the pose is its object frame.
     """
 
     name: str
@@ -39,6 +41,7 @@ class Frame:
     line: int | None = None
     world: bool = False
     held: bool = False
+    user: RigidTransform | None = None
 
     def __str__(self) -> str:
         return f"{self.name} {self.label}".rstrip()

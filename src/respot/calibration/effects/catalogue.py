@@ -26,6 +26,7 @@ from respot.calibration.effects import (
     scale,
     tip_wear,
     tool_shift,
+    wrong_frame,
 )
 from respot.calibration.effects.term import Mechanism, Term
 from respot.calibration.observations import Observations
@@ -49,6 +50,7 @@ MECHANISMS: dict[str, Mechanism] = {
         readback_lag.MECHANISM,
         *drift.MECHANISMS,
         tip_wear.MECHANISM,
+        wrong_frame.MECHANISM,
         group_shift.MECHANISM,
         rail.MECHANISM,
         covariate.MECHANISM,

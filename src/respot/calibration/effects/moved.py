@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from respot.calibration.effects import joint_profile, tool_shift
+from respot.calibration.effects import joint_profile, tool_shift, wrong_frame
 from respot.calibration.effects.catalogue import MECHANISMS
 from respot.calibration.effects.term import Term
 from respot.calibration.observations import Observations
@@ -24,9 +24,10 @@ _NEAR = 1.2
 def moved(observations: Observations, terms: Sequence[Term], values: Sequence[Array]) -> tuple[Array, Rotation | None]:
     """Poses of the TCP with the effects in them, source frame.
 
-    Errors of joints and lengths go through the arm's own kinematics with the tool as it is (DESIGN section 6: ``FK(q +
-    dq, geometry + dg) * tool * dtool``); other shifts in the tool turn with it; shifts of the part come last, and are
-    those of the place where the tool really is.
+    Frames that are wrong come first: where they put the spots all else is computed. Errors of joints and lengths go
+    through the arm's own kinematics with the tool as it is (DESIGN section 6: ``FK(q + dq, geometry + dg) * tool *
+    dtool``); other shifts in the tool turn with it; shifts of the part come last, and are those of the place where the
+    tool really is.
 
     Parameters
     ----------
@@ -48,7 +49,7 @@ def moved(observations: Observations, terms: Sequence[Term], values: Sequence[Ar
         points, turned = _through(observations, arm)
         rotations = None if rotations is None else turned * rotations
     for term, value in zip(terms, values, strict=True):
-        if _through_arm(term) or term.effect == tool_shift.NAME:
+        if _through_arm(term) or term.effect in (tool_shift.NAME, wrong_frame.NAME):
             continue
         mechanism = MECHANISMS[term.effect]
         shift = mechanism.shifts(observations, term) @ value
@@ -60,8 +61,8 @@ def moved(observations: Observations, terms: Sequence[Term], values: Sequence[Ar
 
 
 def at_tip(observations: Observations, terms: Sequence[Term], values: Sequence[Array]) -> Observations:
-    """Return the spots where a tool offset among the terms has them."""
-    return observations.tipped(tip_of(terms, values))
+    """Return the spots where the frames and a tool offset among the terms have them."""
+    return wrong_frame.at_frames(observations, terms).tipped(tip_of(terms, values))
 
 
 def tip_of(terms: Sequence[Term], values: Sequence[Array]) -> Array:
@@ -73,6 +74,8 @@ def tip_of(terms: Sequence[Term], values: Sequence[Array]) -> Array:
 def missing(observations: Observations, term: Term) -> str:
     """Say what observations lack that a term needs; empty if nothing."""
     mechanism = MECHANISMS[term.effect]
+    if term.effect == wrong_frame.NAME:
+        return wrong_frame.lacking(observations, term)
     column = str(term.where.get("column", ""))
     if column:
         if column not in observations.columns:
@@ -164,14 +167,16 @@ def unmoved(observations: Observations, terms: Sequence[Term], values: Sequence[
     ValueError
         The effects are so large that the places are not found.
     """
+    others = [pair for pair in zip(terms, values, strict=True) if pair[0].effect != wrong_frame.NAME]
+    framed = wrong_frame.at_frames(observations, terms)
     found, left = wanted.copy(), np.inf
     for _ in range(_TURNS):
-        there, _ = moved(observations.at(found), terms, values)
+        there, _ = moved(framed.at(found), [term for term, _ in others], [value for _, value in others])
         step = wanted - there
         found = found + step
         left = float(np.abs(step).max(initial=0.0))
         if left < _STILL_MM:
-            return found
+            break
     if left < _NEARLY_MM:
-        return found
+        return wrong_frame.before_frames(observations, terms, found)
     raise ValueError(f"the effects are so large that places are found to {left:.3g} mm only")

@@ -121,7 +121,7 @@ def read_work_object(name: str, value: Value | None, path: str, line: int) -> Fr
     if not fixed:
         unit = str(items[2]).strip('"') or "a mechanical unit"
         return Frame(name, "", None, f"its user frame moves with {unit}", path, line, held=held)
-    return Frame(name, "", user * work, "", path, line, held=held)
+    return Frame(name, "", user * work, "", path, line, held=held, user=user)
 
 
 def read_load(name: str, value: Value | None, path: str, line: int) -> Load:
