@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 from respot.calibration.calibration import Calibration
 from respot.cli import app
+from tests.difference.witness import assert_witnessed
 
 SPOTS = {"S1": (1000, 0, 500), "S2": (1400, 0, 500), "S3": (1000, 600, 500), "S4": (1200, 300, 900)}
 TURN = np.array([[np.cos(0.05), -np.sin(0.05), 0], [np.sin(0.05), np.cos(0.05), 0], [0, 0, 1]])
@@ -58,6 +59,8 @@ def convert_again(tmp_path: Path, backup: Path, *options: str, translation=SHIFT
     arguments = ["convert", str(backup), "-c", str(tmp_path / f"{name}.json"), "-o", str(tmp_path / name), "--json"]
     result = CliRunner().invoke(app, [*arguments, *options])
     record = json.loads(result.stdout) if result.stdout else {}
+    if record and (tmp_path / name).is_dir():  # whatever is written, an independent witness sees the same
+        assert_witnessed(record["edits"], backup, tmp_path / name)
     return Converted(result.exit_code, record, result.stderr, tmp_path / name)
 
 

@@ -256,6 +256,6 @@ def _plural(number: int, word: str) -> str:
 
 def _echo(text: str, look: Show, colour: str | None = None, bold: bool = False) -> None:
     if look.coloured:
-        typer.secho(printable(text), fg=colour, bold=bold, color=True)
+        typer.secho(printable(text), fg=colour, bold=bold or None, color=True)
     else:
         typer.echo(printable(text))

@@ -91,7 +91,8 @@ def compare(
     files, noise = ([], []) if robot_name is not None else _rest(sides, pairs)
     known = {(issue.code, issue.message) for issue in _issues(sides[0])}
     fresh = [issue for issue in _issues(sides[1]) if (issue.code, issue.message) not in known]
-    return Comparison(*sides, robots, files, noise, [*issues, *fresh])
+    told = [issue for robot in robots for issue in robot.issues]
+    return Comparison(*sides, robots, files, noise, [*issues, *told, *fresh])
 
 
 def _issues(backup: Backup) -> list[Issue]:

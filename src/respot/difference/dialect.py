@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from scipy.spatial.transform import RigidTransform
 
 from respot.program.statement import Statement
 from respot.source import Span
+
+#: What statements are about, the most important first.
+RANK = ("motion", "target", "weld", "speed", "zone", "io", "frame", "call", "flow", "wait", "data", "header", "unread")
+
+
+def ranked(abouts: Iterable[str]) -> tuple[str, ...]:
+    """Return what some statements are about, each once, the most important first."""
+    return tuple(sorted(dict.fromkeys(abouts), key=lambda about: RANK.index(about) if about in RANK else len(RANK)))
 
 
 @dataclass(frozen=True)

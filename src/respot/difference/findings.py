@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from respot.issues import Issue
+
 
 @dataclass(frozen=True)
 class Place:
@@ -63,7 +65,8 @@ class Moved:
     tool, base : Change
         Names of the frames it is used with; a text that is the same on both sides did not change.
     configuration, axes : mapping of str to Change
-        Status and turn or confdata, and joints and external axes, that changed.
+        Status and turn or confdata, and joints and external axes, that changed; of a pose that is not known all its
+        numbers.
     spot_id : str
         ID of the weld spot; empty if it is none.
     """
@@ -276,6 +279,8 @@ class RobotDifference:
         ``compared``; ``added`` or ``removed`` where only one side has it.
     targets : int
         Targets that both sides have.
+    issues : list of Issue
+        What a person should know of it.
     """
 
     name: str
@@ -290,6 +295,7 @@ class RobotDifference:
     code: list[CodeChange] = field(default_factory=list)
     files: list[FileChange] = field(default_factory=list)
     noise: list[Noise] = field(default_factory=list)
+    issues: list[Issue] = field(default_factory=list)
 
     @property
     def same(self) -> bool:

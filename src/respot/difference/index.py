@@ -83,8 +83,7 @@ class Index:
                 masks.append((target.span, TARGET))
             else:
                 masks += [(number.span, NUMBER) for number in target.numbers.values()]
-        for offset, _ in self.offsets_in(path, statement):
-            masks += [(number.span, NUMBER) for number in offset.numbers if number is not None]
+        masks += [(offset.span, TARGET) for offset, _ in self.offsets_in(path, statement)]
         return masks
 
     def signature(self, frame: Frame | None) -> tuple[object, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 
-from respot.difference.dialect import Datum, Dialect, FrameValue
+from respot.difference.dialect import Datum, Dialect, FrameValue, ranked
 from respot.geometry import pose, rotation_from_abc
 from respot.languages.krl.forms import FORMS
 from respot.languages.krl.symbols import Aggregate, Symbol, read_symbols
@@ -143,7 +143,7 @@ def _about_declaration(statement: Statement) -> str:
 def _aspects(old: Statement, new: Statement) -> tuple[str, ...]:
     abouts = (_about(old), _about(new))
     if abouts != ("motion", "motion") or old.kind != new.kind:
-        return tuple(dict.fromkeys(abouts[::-1]))
+        return ranked(abouts)
     parts = [_motion_parts(statement) for statement in (old, new)]
     found = [name for name in ("motion", "target", "zone", "speed") if parts[0][name] != parts[1][name]]
     return tuple(found) or ("motion",)

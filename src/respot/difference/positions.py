@@ -93,15 +93,15 @@ class Comparer:
             return None, False
         shift = None if same_text else _own_shift(old, new)
         configuration = {} if same_text else _changes(old, new, _CONFIGURATION.__contains__)
-        axes = {} if same_text else _changes(old, new, lambda name: name not in _CONFIGURATION | _POSE)
+        posed = _POSE if old.components and new.components else frozenset()
+        axes = {} if same_text else _changes(old, new, lambda name: name not in _CONFIGURATION | posed)
         small = {name: change for name, change in axes.items() if self._small(change, name)}
         axes = {name: change for name, change in axes.items() if name not in small}
         world, (before, after) = self._world(uses, old, new)
         if shift is None and world is not None and all(self._same_base(*pair) for pair in uses):
             world = Shift(0.0, 0.0, 0.0)  # digits that no controller holds
-        lost = not same_text and bool(old.components) != bool(new.components)
         still = self._tolerance.holds(shift) and self._tolerance.holds(world)
-        if still and not configuration and not axes and not lost:
+        if still and not configuration and not axes:
             rounded = bool(small) or (shift is not None and not Tolerance().holds(shift))
             return None, rounded
         return _moved(old, new, shift, world, before, after, configuration, axes, self._new), False

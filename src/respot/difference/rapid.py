@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 
 from respot.difference.canonical import plain_tokens
-from respot.difference.dialect import Datum, Dialect, FrameValue
+from respot.difference.dialect import Datum, Dialect, FrameValue, ranked
 from respot.languages.rapid.calls import read_lines
 from respot.languages.rapid.forms import FORMS, InstructionForm, instruction_form
 from respot.languages.rapid.machine import read_load, read_tool, read_tool_load, read_work_object
@@ -134,7 +134,7 @@ def _about_call(name: str) -> str:
 def _aspects(old: Statement, new: Statement) -> tuple[str, ...]:
     abouts = (_about(old), _about(new))
     if abouts != ("motion", "motion") or {old.kind, new.kind} != {"call"}:
-        return tuple(dict.fromkeys(abouts[::-1]))
+        return ranked(abouts)
     names = [plain_tokens(statement)[0] for statement in (old, new)]
     forms = [instruction_form(name) for name in names]
     parts = [_motion_parts(statement, form) for statement, form in zip((old, new), forms, strict=True)]

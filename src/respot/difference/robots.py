@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from respot.difference.alignment import increasing
 from respot.difference.blocks import Block, moved_blocks
 from respot.difference.canonical import key
+from respot.difference.dialect import ranked
 from respot.difference.dialects import DIALECTS
 from respot.difference.findings import CodeChange, FileChange, Named, Noise, Place, RobotDifference
 from respot.difference.frames import FrameComparer, frame_masks, frames_in
@@ -18,13 +19,11 @@ from respot.difference.positions import Comparer, Tolerance, pair_targets
 from respot.difference.programs import CodePair, DataPair, FilePair, Side
 from respot.difference.renames import Renames
 from respot.difference.texts import TextComparison, is_own_record, kind_of
+from respot.issues import Issue
 from respot.program.robot import Robot
 from respot.program.statement import Statement
 from respot.program.targets import Target
 from respot.source import NEWLINE
-
-#: What a run of statements is about, if it is about several things: the first of these that it holds.
-_RANK = ("motion", "target", "weld", "speed", "zone", "io", "frame", "call", "flow", "wait", "data", "unread")
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +178,10 @@ class RobotComparison:
             self._lone_part(pair, part, removed=False)
         self.found.noise += remarks(pair, pair.parts)
         self.found.noise += layout(pair.old.file.source, pair.new.file.source)
-        if before == self._counts():
+        common = [[name for name in side.parts if name in other.parts] for side, other in _both_ways(pair)]
+        if common[0] != common[1]:
+            self.found.noise.append(Noise("order", pair.new.path))
+        if before == self._counts() and not pair.old.names:
             self.found.noise.append(Noise("blanks", pair.new.path))
 
     def _counts(self) -> tuple[int, ...]:
@@ -236,6 +238,8 @@ class RobotComparison:
         if kind and pair.old.key(old) != pair.new.key(new):
             name = ", ".join(datum.name for datum in declared)
             self.found.noise.append(Noise(kind, pair.new.path, new.line, old.source, new.source, name=name))
+            if kind == "drift":
+                self._drifted_frames(pair, old, new)
             return
         frames = frames_in(pair.old, old), frames_in(pair.new, new)
         common = [name for name in frames[1] if pair.old.names.get(name, name) in frames[0]]
@@ -250,6 +254,19 @@ class RobotComparison:
             for side, item, found in ((pair.old, old, frames[0]), (pair.new, new, frames[1]))
         ]
         self._verdict(pair, data.new, old, new, masked[0] == masked[1], rounded)
+
+    def _drifted_frames(self, pair: FilePair, old: Statement, new: Statement) -> None:
+        """Say that a tool or base differs, though it may be the program itself that changed it."""
+        frames = frames_in(pair.old, old), frames_in(pair.new, new)
+        for name in frames[0].keys() & frames[1].keys():
+            change, _ = self._frames.changed((pair.old, old, frames[0][name]), (pair.new, new, frames[1][name]))
+            if change is not None:
+                far = "" if change.shift is None else f" by {change.shift.distance:.3f} mm, {change.shift.turn:.4f} deg"
+                message = (
+                    f"{change.kind} {change.name} differs{far}, and the program writes it while it runs: whether "
+                    "someone edited it cannot be told; it is counted as noise"
+                )
+                self.found.issues.append(Issue("RUN_TIME_FRAME", message, pair.new.path, new.line))
 
     def _is_drift(self, pair: FilePair, old: Statement, new: Statement) -> bool:
         """Whether a value was changed by the program itself: it may, the controller saves it, and nobody typed it."""
@@ -385,8 +402,7 @@ class RobotComparison:
         return rounded
 
     def _aspects_of(self, statements: Iterable[Statement]) -> tuple[str, ...]:
-        abouts = {self._dialect.about(statement) for statement in statements}
-        return tuple(about for about in _RANK if about in abouts) or tuple(sorted(abouts))
+        return ranked(self._dialect.about(statement) for statement in statements)
 
     def _add_code(
         self,
@@ -412,6 +428,10 @@ class RobotComparison:
                 aspects=aspects,
             )
         )
+
+
+def _both_ways(pair: FilePair) -> tuple[tuple[Side, Side], tuple[Side, Side]]:
+    return (pair.old, pair.new), (pair.new, pair.old)
 
 
 def _lines(statements: Iterable[Statement]) -> list[str]:

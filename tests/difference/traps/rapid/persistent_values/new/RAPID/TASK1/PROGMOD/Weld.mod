@@ -1,0 +1,21 @@
+MODULE Weld
+  CONST robtarget p10:=[[100,200,300],[0.5,0.5,0.5,0.5],[0,-1,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
+  CONST robtarget p20:=[[200,200,300],[0.5,0.5,0.5,0.5],[0,-1,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
+  CONST robtarget p30:=[[300,200,300],[0.5,0.5,0.5,0.5],[0,-1,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
+  CONST robtarget p40:=[[400,200,300],[0.5,0.5,0.5,0.5],[0,-1,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
+  PERS num nCount:=912;
+  PERS num nLimit:=600;
+  PERS num nTimes{3}:=[7.25,2,3];
+  VAR num nStart:=3;
+  PERS robtarget pLast:=[[77.5,200,300],[0.5,0.5,0.5,0.5],[0,-1,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
+  PROC rWeld()
+    nCount:=nCount+1;
+    nTimes{1}:=ClkRead(c1);
+    nStart:=2;
+    pLast:=CRobT(\Tool:=tGun\WObj:=wDoor);
+    MoveL p10,v200,z10,tGun\WObj:=wDoor;
+    MoveL p20,v200,z10,tGun\WObj:=wDoor;
+    MoveL p30,v200,z10,tGun\WObj:=wDoor;
+    MoveL p40,v200,z10,tGun\WObj:=wDoor;
+  ENDPROC
+ENDMODULE
