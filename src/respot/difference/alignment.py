@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Callable, Hashable, Iterator, Sequence
+from difflib import SequenceMatcher
 
 #: Ranges of the old and the new sequence: (old start, old end, new start, new end).
 Range = tuple[int, int, int, int]
@@ -18,7 +19,7 @@ Pair = tuple[int, int]
 _MOST_OCCURRENCES = 64
 #: A gap slides no further to find the beginning of a group.
 _FURTHEST = 20
-#: Cells of a table that pairs what is alike, not equal.
+#: Cells of a table that pairs what is alike, or what has no anchors.
 _MOST_CELLS = 40_000
 
 
@@ -55,6 +56,11 @@ def _pairs(old: Sequence[Hashable], new: Sequence[Hashable]) -> Iterator[Pair]:
         if not anchors:
             run = _rarest_run(old, new, (i0, i1, j0, j1))
             anchors = [] if run is None else [(run[0] + step, run[1] + step) for step in range(run[2])]
+        if not anchors and (i1 - i0) * (j1 - j0) <= _MOST_CELLS:
+            # nothing but what occurs again and again
+            matcher = SequenceMatcher(None, old[i0:i1], new[j0:j1], autojunk=False)
+            for i, j, length in matcher.get_matching_blocks():
+                yield from ((i0 + i + step, j0 + j + step) for step in range(length))
         if not anchors:
             continue
         before = (i0, j0)
