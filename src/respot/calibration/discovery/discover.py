@@ -282,14 +282,16 @@ def _aliases_of_tool(terms: Sequence[Term], columns: Array) -> tuple[int, ...]:
 def _settle(search: _Search, inliers: Mask, draws: int) -> _Found:
     """Search, fit, judge outliers by the model, and search again until nothing changes."""
     seen: list[tuple[bytes, tuple[Term, ...]]] = []
-    fit = fit_jointly(search.observations, search.reference, (), inliers)
+    # about a tool that is far off nothing is linear
+    begin = [i for i, term in enumerate(search.terms) if term.effect == tool_shift.NAME and np.any(search.tip)]
+    fit = fit_jointly(search.observations, search.reference, [search.terms[i] for i in begin], inliers)
     printing = fit.sigma <= SCALE_FLOOR  # what is finer than a micrometre has no cause
     found: _Found | None = None
     for _ in range(_ROUNDS):
         rows = np.flatnonzero(inliers)
         even = None if found is None else evening(fit.noise)
         selection = _selection(search, fit, draws, even)
-        start = () if found is None else found.state.chosen
+        start = tuple(begin) if found is None else found.state.chosen
         judged = len(rows) >= LEAST_SPOTS and not printing
         state = selection.search(start) if judged else selection.state((), 0.0)
         chosen = tuple(sorted(state.chosen))

@@ -27,9 +27,9 @@ def _terms(observations: Observations) -> list[Term]:
         Parameter(
             f"link_{axis + 1}_{kind}", "mm" if kind[0] == "d" else "deg", PRIOR_MM if kind[0] == "d" else PRIOR_DEG
         )
-        for axis in range(observations.robot.axes)
+        for axis in range(observations.robot.axes - 1)  # the last link's errors are a tool offset
         for kind in ("dx", "dy", "dz", "rx", "ry", "rz")
-    )[:-3]  # the flange carries the tool: an error of its angles moves the tip as one of its place does
+    )
     return [
         Term(
             NAME,
@@ -42,7 +42,7 @@ def _terms(observations: Observations) -> list[Term]:
 
 
 def _columns(observations: Observations, term: Term) -> NDArray[np.float64]:  # noqa: ARG001 - one place only
-    return observations.link_columns[:, :, :-3]
+    return observations.link_columns[:, :, :-6]
 
 
 def _turns(observations: Observations, term: Term) -> NDArray[np.float64]:
