@@ -45,21 +45,21 @@ class FrameComparer:
         known = before.pose is not None and after.pose is not None
         shift = shift_between(before.pose, after.pose) if before.pose is not None and after.pose is not None else None
         fields = _fields(before.fields, after.fields)
-        texts = tuple(
-            " ".join(statement.text[slice(*value.span)].split())
-            for statement, value in ((old_statement, before), (new_statement, after))
-        )
+        texts = _text(old_statement, before), _text(new_statement, after)
+        exact = Tolerance().holds(shift)
+        if known and exact and not fields and not _same_numbers(old_statement, before, new_statement, after):
+            fields = {"value": texts}  # such as a user frame and an object frame that make the same base
         if known and not fields and self._tolerance.holds(shift):
-            return None, not Tolerance().holds(shift)
+            return None, not exact
         name = after.name
         moves = self._moves[1][name.upper()]
         places = Place(old_side.path, old_statement.line), Place(new_side.path, new_statement.line)
-        return FrameChange(after.kind, name, "changed", *places, shift, fields, (texts[0], texts[1]), moves), False
+        return FrameChange(after.kind, name, "changed", *places, shift, fields, texts, moves), False
 
     def lone(self, side: Side, statement: Statement, value: FrameValue, removed: bool) -> FrameChange:
         """Return a frame that only one side has."""
         place = Place(side.path, statement.line)
-        text = " ".join(statement.text[slice(*value.span)].split())
+        text = _text(statement, value)
         moves = self._moves[0 if removed else 1][value.name.upper()]
         if removed:
             return FrameChange(value.kind, value.name, "removed", place, None, texts=(text, ""), moves=moves)
@@ -79,6 +79,22 @@ def frame_masks(values: Mapping[str, FrameValue], names: Iterable[str]) -> Itera
     """Yield the literals of the named frames: they are compared by what they mean."""
     for name in names:
         yield values[name].span, TARGET
+
+
+def _text(statement: Statement, value: FrameValue) -> str:
+    return " ".join(statement.text[slice(*value.span)].split())
+
+
+def _same_numbers(old: Statement, before: FrameValue, new: Statement, after: FrameValue) -> bool:
+    """Whether the literals hold the same numbers, but for the signs of a quaternion."""
+    found = []
+    for statement, value in ((old, before), (new, after)):
+        numbers = statement.numbers()
+        inside = zip(numbers.values, numbers.spans, strict=True)
+        found.append(
+            [abs(single(number)) for number, span in inside if value.span[0] <= span[0] and span[1] <= value.span[1]]
+        )
+    return found[0] == found[1]
 
 
 def _moves(index: Index) -> Counter[str]:

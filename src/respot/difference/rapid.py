@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from respot.difference.canonical import plain_tokens
 from respot.difference.dialect import Datum, Dialect, FrameValue, ranked
 from respot.languages.rapid.calls import read_lines
 from respot.languages.rapid.forms import FORMS, InstructionForm, instruction_form
-from respot.languages.rapid.machine import read_load, read_tool, read_tool_load, read_work_object
-from respot.languages.rapid.symbols import Aggregate, Symbol, data_symbol
+from respot.languages.rapid.machine import read_tool, read_work_object
+from respot.languages.rapid.records import BUILT_IN
+from respot.languages.rapid.symbols import Aggregate, Symbol, Value, data_symbol
 from respot.languages.rapid.syntax import AFTER_MODULE, COMMENT
 from respot.program.statement import Statement
+from respot.program.targets import Number
 
 _FLOW = frozenset(
     [
@@ -28,6 +30,8 @@ _TYPES = {
     "weavedata": "weld", "trackdata": "weld", "robtarget": "target", "jointtarget": "target", "o_robtarget": "target",
     "o_jointtarget": "target", "tooldata": "frame", "wobjdata": "frame", "loaddata": "frame", "pose": "frame",
 }  # fmt: skip
+#: Fields that a pose is made of: it is compared as a whole.
+_PLACES = ("tframe.", "uframe.", "oframe.", "trans.", "rot.")
 _FRAMES = {"tooldata": "tool", "wobjdata": "base", "loaddata": "load", "pose": "frame"}
 _IO = re.compile(r"(?:Set|Reset|Invert|Pulse)(?:[DAG][OI])?|Wait[DAG][IO]|(?:Alias|Signal)IO\w*", re.IGNORECASE)
 _WAIT = frozenset(("waittime", "waituntil", "waitrob", "waitsynctask"))
@@ -75,28 +79,29 @@ def _frames(path: str, statement: Statement) -> Sequence[FrameValue]:
     if symbol is None or kind is None or not isinstance(value, Aggregate):
         return []
     name, line = symbol.name, symbol.line
-    pose = None
-    fields: dict[str, float | str] = {}
     if symbol.type == "tooldata":
-        tool, load = read_tool(name, value, path, line), read_tool_load(name, value, path, line)
-        pose = tool.pose
-        fields = {"robhold": str(tool.held).upper(), **_load_fields(load.mass, load.centre)}
+        pose = read_tool(name, value, symbol.path, line).pose
     elif symbol.type == "wobjdata":
-        base = read_work_object(name, value, path, line)
-        pose = base.pose
-        fields = {"robhold": str(base.held).upper()}
-    elif symbol.type == "loaddata":
-        load = read_load(name, value, path, line)
-        fields = _load_fields(load.mass, load.centre)
-    elif len(value.items) == 2:  # a pose is the frame of a tool without its load
-        pose = read_tool(name, Aggregate(["TRUE", value, ""], value.span), path, line).pose
+        pose = read_work_object(name, value, symbol.path, line).pose
+    elif symbol.type == "pose":  # read as the frame of a tool without its load
+        pose = read_tool(name, Aggregate(["TRUE", value, ""], value.span), symbol.path, line).pose
+    else:
+        pose = None
+    fields = dict(_flat(value, symbol.type, ""))
+    if pose is not None:
+        fields = {place: item for place, item in fields.items() if not place.startswith(_PLACES)}
     return [FrameValue(kind, name, pose, value.span, fields)]
 
 
-def _load_fields(mass: float | None, centre: tuple[float, float, float] | None) -> dict[str, float | str]:
-    if mass is None or centre is None:
-        return {}
-    return {"mass": mass, **{f"centre {axis}": value for axis, value in zip("xyz", centre, strict=True)}}
+def _flat(value: Value, kind: str, prefix: str) -> Iterator[tuple[str, float | str]]:
+    """Yield every value of a record with its name: ``tload.mass``."""
+    if isinstance(value, Aggregate):
+        known = BUILT_IN.get(kind, ())
+        names = known if len(known) == len(value.items) else [("", str(index + 1)) for index in range(len(value.items))]
+        for item, (inner, name) in zip(value.items, names, strict=True):
+            yield from _flat(item, inner, f"{prefix}{name}.")
+    else:
+        yield prefix.rstrip("."), float(value.value) if isinstance(value, Number) else str(value).upper()
 
 
 def _noise(statement: Statement, declared: Sequence[Datum]) -> str:
