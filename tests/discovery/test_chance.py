@@ -55,3 +55,12 @@ def test_where_there_is_nothing_one_answer_in_a_hundred_is_below_one_in_a_hundre
     values = np.array(values)
     assert np.mean(values <= 0.05) < 0.11  # 4 sd above
     assert 0.35 < np.mean(values <= 0.5) < 0.65
+
+
+def test_where_no_term_is_left_chance_gains_nothing():
+    left = BANK.project(np.random.default_rng(2).normal(scale=NOISE, size=3 * 60))
+    gains = BANK.gains(BANK.span((), NOISE), BANK.columns.T @ left, NOISE)
+    none, basis = np.zeros(len(TERMS), dtype=bool), np.zeros((len(left), 0))
+    chance = by_chance(BANK, basis, left, gains, none, EFFECTS, len(left) - 6, draws=20, seed=0)
+    assert chance.largest.shape == (20,) and np.all(chance.largest == -np.inf)
+    assert p_value(-1.0, chance) == 1.0 / 21.0

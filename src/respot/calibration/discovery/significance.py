@@ -160,7 +160,8 @@ def by_chance(
     tries = np.ones(len(scores))
     # the largest of k independent normal numbers has the distribution Phi^k: k by maximum likelihood
     tries[tried] = np.maximum(1.0 / np.mean(-special.log_ndtr(scores[tried]), axis=1), 1.0)
-    return Chance(tries, _less_tries(scores[tried], tries[tried, None]).max(axis=0))
+    evened = _less_tries(scores[tried], tries[tried, None])
+    return Chance(tries, evened.max(axis=0, initial=-np.inf))
 
 
 def p_value(score: float, chance: Chance) -> float:
