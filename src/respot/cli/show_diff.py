@@ -156,7 +156,7 @@ def _moved_row(item: Record) -> list[str]:
             numbers += ["", "", "?", "?", "?"]
             continue
         numbers += [*(f"{shift[name]:.3f}" for name in ("dx", "dy", "dz", "distance")), f"{turn:.4f}"]
-    name = item["spot_id"] if item["spot_id"] and item["spot_id"] != item["target"] else ""
+    name = item["spot_id"] if item["spot_id"] and item["spot_id"] not in item["target"] else ""
     base = item["base"] or "?"
     if item["old_base"] != item["base"]:
         base = f"{item['old_base'] or '?'} -> {base}"

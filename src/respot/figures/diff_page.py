@@ -13,13 +13,13 @@ _LEVELS = ("error", "warning", "info")
 #: Rows of a table on the page: a browser takes no more with ease. The JSON has them all.
 _MOST_ROWS = 2000
 _WORDS = (
-    ("moved", "targets moved"),
-    ("frames", "frames changed"),
-    ("added", "targets added"),
-    ("removed", "targets removed"),
-    ("renamed", "names changed"),
-    ("code", "changes of code"),
-    ("files", "files differ"),
+    ("moved", "target moved", "targets moved"),
+    ("frames", "frame changed", "frames changed"),
+    ("added", "target added", "targets added"),
+    ("removed", "target removed", "targets removed"),
+    ("renamed", "name changed", "names changed"),
+    ("code", "change of code", "changes of code"),
+    ("files", "file differs", "files differ"),
 )
 
 
@@ -57,7 +57,7 @@ def _robot(robot: Mapping[str, Any]) -> dict[str, Any]:
     moved = sorted(robot["moved"], key=_largest, reverse=True)
     return {
         **robot,
-        "counts": [(len(robot[name]), words) for name, words in _WORDS],
+        "counts": [(len(robot[name]), one if len(robot[name]) == 1 else many) for name, one, many in _WORDS],
         "moved": [_moved(item) for item in moved[:_MOST_ROWS]],
         "moved_left": max(0, len(moved) - _MOST_ROWS),
         "frames": [{**item, "said": _frame(item)} for item in robot["frames"]],
