@@ -44,6 +44,7 @@ class Group:
     tool: int = 1
     real_base: int | None = None
     real_tool: int | None = None
+    real_pose: RigidTransform | None = None
     shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
     line: bool = False
 
@@ -58,7 +59,7 @@ class Cell:
     noise: float = 0.1
     seed: int = 3
     registration: tuple[float, ...] = REGISTRATION
-    oriented: bool = True
+    swapped: tuple[tuple[str, str], ...] = ()
 
     def __post_init__(self) -> None:
         dice = np.random.default_rng(self.seed)
@@ -83,6 +84,8 @@ class Cell:
         if group.real_base is not None:
             other = pose(self.bases[group.real_base]) if group.real_base else RigidTransform.identity()
             place = other * (base.inv() * place)
+        if group.real_pose is not None:
+            place = group.real_pose * (base.inv() * place)
         if group.real_tool is not None:
             flange = place * pose(self.tools[group.tool]).inv()
             place = flange * pose(self.tools[group.real_tool])
@@ -95,9 +98,10 @@ class Cell:
         with path.open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file)
             writer.writerow(["id", "x", "y", "z"])
+            names = {name: other for pair in self.swapped for name, other in (pair, pair[::-1])}
             for name, place, group in self.places:
                 there = np.asarray((seen * self.real(place, group)).translation) + dice.normal(0.0, self.noise, 3)
-                writer.writerow([name, *(f"{value:.4f}" for value in there)])
+                writer.writerow([names.get(name, name), *(f"{value:.4f}" for value in there)])
 
     def write_krl(self, folder: Path) -> None:
         """Write a KRC4-like backup."""

@@ -59,6 +59,11 @@ CATALOGUE = (
         ({"external_axis": 1}, "external axis 1"),
         ({"frame": "tool"}, "tool frame"),
         ({"link": 4, "new_key": "x"}, "link 4, new key x"),
+        (
+            {"column": "program", "level": "w", "frame": "base", "written": "B[3]", "real": "B[4]"},
+            "program w, B[4] in the place of B[3]",
+        ),
+        ({"frame": "uframe", "written": "w3", "real": "w4"}, "the user frame of w4 in the place of that of w3"),
     ],
 )
 def test_places(where, words):
@@ -93,6 +98,10 @@ def test_an_unknown_effect_stays_readable():
         ("gravity_sag axes 2, 3", "sag of axes 2, 3 under weight"),
         ("link_length parameter a2", "arm length a2"),
         ("rail external_axis 1", "error along external axis 1"),
+        (
+            "wrong_frame column program level w frame base written B[3] real B[4]",
+            "a wrong frame (tool or base): program w, B[4] in the place of B[3]",
+        ),
         ("scale", "growth or shrinkage (scale)"),
         ("rigid transform alone", "rigid transform alone"),
         ("scale of the drawing", "scale of the drawing"),

@@ -18,6 +18,7 @@ from respot.calibration.effects.convention_tool import investigate_by_tool
 from respot.calibration.effects.moved import moved
 from respot.calibration.effects.readings import Columns, reread
 from respot.calibration.effects.search import Effects, search_effects
+from respot.calibration.effects.term import Term
 from respot.calibration.effects.tool_offset import ToolTrial
 from respot.calibration.effects.wrong_frame_search import FrameSearch, find_wrong_frames
 from respot.calibration.observations import Observations
@@ -167,31 +168,32 @@ def find_causes(
     seen = replace(observe(every), positions=source, rotations=rotations)
     frames = find_wrong_frames(seen, reference, same_frame=same_frame, seed=seed)
     found = causes(frames)
-    # what other effects hide may be a listed frame as well: a group that they leave moved as a body
-    beside = _beside(found)
+    # what other effects hide may be a listed frame as well, and beside them it is known better
+    beside = _beside(found, frames.terms)
     if beside is None:
         return replace(found, frames=frames)
     repaired = reference[found.exchanged.permutation]
-    more = find_wrong_frames(
-        frames.observations, repaired, same_frame=same_frame, seed=seed, beside=beside, before=frames.terms
-    )
-    if not more.terms:
-        return replace(found, frames=replace(frames, unproved=more.unproved))
-    both = replace(more, terms=(*frames.terms, *more.terms), effects=(*frames.effects, *more.effects))
-    return replace(causes(both), frames=both)
+    again = find_wrong_frames(seen, repaired, same_frame=same_frame, seed=seed, beside=beside)
+    if {term.label for term in again.terms} != {term.label for term in frames.terms}:
+        found = causes(again)
+    return replace(found, frames=again)
 
 
-def _beside(found: Causes) -> Array | None:
-    """Shifts (n, 3) by all effects but moved groups, where there are such groups; None where there are none [mm]."""
+def _beside(found: Causes, frames: Sequence[Term]) -> Array | None:
+    """Shifts (n, 3) by all effects but frames and moved groups, as before the frames; None where no search needs them.
+
+    That is where neither a group moved nor a frame is wrong, or no other effect is at work [mm].
+    """
     discovery, seen = found.in_model, found.observations
     if discovery is None or seen is None:
         return None
     pairs = list(zip(discovery.fit.terms, discovery.fit.values, strict=True))
-    if all(term.effect != group_shift.NAME for term, _ in pairs):
-        return None
     others = [(term, value) for term, value in pairs if term.effect not in (group_shift.NAME, wrong_frame.NAME)]
+    groups = any(term.effect == group_shift.NAME for term, _ in pairs)
+    if not groups and not (frames and others):
+        return None
     places, _ = moved(seen, [term for term, _ in others], [value for _, value in others])
-    return places - seen.positions
+    return wrong_frame.turned_back(seen, frames, places - seen.positions)
 
 
 def _causes(
@@ -235,8 +237,9 @@ def _causes(
         seen = Observations(source, rotations)
         if observe is not None:
             seen = replace(observe(names.permutation), positions=source, rotations=rotations)
-        if frames is not None and frames.observations.joints is None:
-            seen = replace(seen, joints=None, measured_joints=None)
+        if frames is not None:
+            joints, measured = frames.observations.joints, frames.observations.measured_joints
+            seen = replace(seen, joints=joints, measured_joints=None if joints is None else measured)
         repaired = reference[names.permutation]
         start = names.robust.inliers
         found = discover(

@@ -12,7 +12,7 @@ import numpy as np
 from respot import __version__
 from respot.calibration.calibration import Frame, Kind
 from respot.calibration.causes import Written, names_of
-from respot.calibration.effects import swapped_ids, tool_offset
+from respot.calibration.effects import swapped_ids, tool_offset, wrong_frame
 from respot.calibration.effects.readings import Columns
 from respot.calibration.effects.search import RIGID_ONLY, Effects
 from respot.calibration.effects.tool_fit import moved_by
@@ -249,6 +249,13 @@ def _effect_issues(fit: SpotFit, source: Source) -> list[Issue]:
             issues.append(
                 Issue("EFFECT_FOUND", f"{how}: {effect.name} {place}: {effect.remedy.text}", str(source.path))
             )
+    seen = fit.observations
+    if wrong_frame.frames_of(fit.model.terms) and seen is not None and seen.robot is not None and seen.joints is None:
+        message = (
+            "where the other base puts the spots the robot has no joints for them: effects of the arm are not looked "
+            "for; correct the base and fit again"
+        )
+        issues.append(Issue("JOINTS_NOT_USED", message, str(source.path)))
     if found.unexplained.present:
         issues.append(Issue("UNEXPLAINED", found.unexplained.text, str(source.path)))
     if fit.observations is not None and fit.observations.absolute_accuracy:

@@ -17,7 +17,7 @@ MOST_IN_A_SENTENCE = 6
 #: Two half widths this close are one.
 _ALIKE = 0.05
 _COMPONENT = re.compile(r"[dt]?_?[xyz](?:_mm)?")
-_LABEL = re.compile(r" (axis|axes|column|level|parameter|external_axis|ids|frame|link|list|reading) ")
+_LABEL = re.compile(r" (axis|axes|column|level|parameter|external_axis|ids|frame|link|list|reading|written|real) ")
 _UNITS = {"deg": "degrees", "degree": "degrees", "1": "", "": "", "percent": "%"}
 
 
@@ -57,7 +57,7 @@ EFFECTS: Mapping[str, EffectWords] = {
         "a wrong frame (tool or base)",
         "{where} ran under another frame than the one listed",
         "a group",
-        "a wrong frame (tool or base) at {where}",
+        "a wrong frame (tool or base): {where}",
     ),
     "tool_offset": EffectWords("a TCP that is off", "the TCP is {size}off, by the same amount at every spot"),
     "scale": EffectWords(
@@ -175,6 +175,9 @@ def place(where: Mapping[str, Any]) -> str:
     if "column" in where:
         column, level = where.pop("column"), where.pop("level", None)
         parts.append(f"column {column}" if level is None else f"{column} {level}")
+    if "written" in where and "real" in where:
+        real, written = _exchanged(str(where.pop("frame", "")), str(where.pop("real")), str(where.pop("written")))
+        parts.append(f"{real} in the place of {written}")
     for key, value in where.items():
         several = isinstance(value, list | tuple)
         text = listing(value) if several else str(value)
@@ -192,6 +195,12 @@ def place(where: Mapping[str, Any]) -> str:
     return ", ".join(parts)
 
 
+def _exchanged(frame: str, real: str, written: str) -> tuple[str, str]:
+    """Name two frames, or the parts of work objects that are exchanged: ``the user frame of wobj_a``."""
+    part = {"uframe": "the user frame of ", "oframe": "the object frame of "}.get(frame, "")
+    return f"{part}{real}", f"that of {written}" if part else written
+
+
 def finding(effect: Mapping[str, Any]) -> str:
     """Say what an effect means for this robot, as a sentence without capital and full stop."""
     name, where = str(effect["name"]), effect.get("where") or {}
@@ -199,6 +208,11 @@ def finding(effect: Mapping[str, Any]) -> str:
     if words is None:
         return f"the spots follow {effect_noun(name, where)}"
     amount = size(effect.get("parameters") or {})
+    if name == "wrong_frame" and "written" in where and "real" in where:
+        real, written = _exchanged(str(where.get("frame") or ""), str(where["real"]), str(where["written"]))
+        group = {key: where[key] for key in ("column", "level") if key in where}
+        whose = f"of {place(group)}" if group else f"under {where['written']}"
+        return f"the spots {whose} lie where {real} would put them, not {written}"
     spot = place(where)
     if name == "group_shift" and "column" in where and where.get("level") is None:
         return f"the groups of {spot} are shifted against each other"

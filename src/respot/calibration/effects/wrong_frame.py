@@ -161,15 +161,38 @@ def lacking(observations: Observations, term: Term) -> str:
 
 
 def at_frames(observations: Observations, terms: Sequence[Term]) -> Observations:
-    """Return the spots where the frames among terms put them; joints and columns stay."""
+    """Return the spots where the frames among terms put them, with the joints that reach there; columns stay."""
     for term in frames_of(terms):
         rows, own = rows_of(observations, term), observations.rotations
         points, turned = _moved(_motion_of(term), _kind_of(term), observations.positions, own)
         points = np.where(rows[:, None], points, observations.positions)
         if own is not None and turned is not None:
             own = Rotation.from_quat(np.where(rows[:, None], turned.as_quat(), own.as_quat()))
-        observations = replace(observations, positions=points, rotations=own)
+        joints = observations.joints
+        if joints is not None and (found := joints_under(observations, term)) is not None:
+            joints = found
+        observations = replace(observations, positions=points, rotations=own, joints=joints)
     return observations
+
+
+def joints_under(observations: Observations, term: Term) -> Array | None:
+    """Joints (n, axes) under another base, nearest to those of the written one; None where a spot is out of reach.
+
+    Under another tool the flange, and so the joints, are the same.
+    """
+    joints, robot = observations.joints, observations.robot
+    if joints is None or robot is None or _kind_of(term) == "tool":
+        return joints
+    base = observations.base2source
+    there = base.inv() * (_motion_of(term) * (base * observations.flange2base))
+    branches = robot.inverse(there, near=joints)
+    apart = np.sum((branches - joints[:, None, :]) ** 2, axis=2)
+    known = np.isfinite(apart)
+    rows = rows_of(observations, term)
+    if not known[rows].any(axis=1).all():
+        return None
+    nearest = branches[np.arange(len(joints)), np.argmin(np.where(known, apart, np.inf), axis=1)]
+    return np.where(rows[:, None], nearest, joints)
 
 
 def before_frames(observations: Observations, terms: Sequence[Term], points: Array) -> Array:
@@ -184,6 +207,15 @@ def before_frames(observations: Observations, terms: Sequence[Term], points: Arr
             back = np.asarray(motion.inv().apply(points))
         points = np.where(rows[:, None], back, points)
     return points
+
+
+def turned_back(observations: Observations, terms: Sequence[Term], shifts: Array) -> Array:
+    """Shifts (n, 3) of spots where the frames among terms put them, as they are where these are written [mm]."""
+    for term in reversed(frames_of(terms)):
+        if _kind_of(term) == "base":
+            back = _motion_of(term).rotation.inv().apply(shifts)
+            shifts = np.where(rows_of(observations, term)[:, None], back, shifts)
+    return shifts
 
 
 def _motion_of(term: Term) -> RigidTransform:

@@ -28,6 +28,7 @@ from respot.calibration.effects.wrong_frame import (
     Exchange,
     at_frames,
     exchanges,
+    joints_under,
     labels_of,
     moved_by,
     remedy_of,
@@ -55,9 +56,9 @@ _CLEARLY_MET = 1e-4  # so rarely met by chance that what is left of the group's 
 _BETTER = 0.5
 _GAIN = 10.0  # in squares of the noise
 _CAP = 100.0  # of one spot, in squares of the noise
-_LARGE = 0.02  # what is left of a large exchange may be this share of it before its spots pass for outliers
+_LARGE = 0.02  # spots of a group may lie apart by this share of a large exchange, and are no outliers
+_MOSTLY = 0.5  # of a group, and of all others, must follow the fit
 _MOST = 4
-_FAR_MM = 20.0
 _PLAUSIBLE_MM = 50.0  # of a whole cell against its theory
 _FLOOR_MM = 1e-3
 _RCOND = 1e-10
@@ -167,7 +168,6 @@ def find_wrong_frames(
     same_frame: bool,
     seed: int,
     beside: Array | None = None,
-    before: Sequence[Term] = (),
 ) -> FrameSearch:
     """Look for groups of spots that lie where another listed frame would put them.
 
@@ -181,9 +181,7 @@ def find_wrong_frames(
         Source and reference claim to be in one coordinate system: then all spots together may be off as well.
     seed : int
     beside : (n, 3) array, optional
-        Shifts by other effects, source frame [mm].
-    before : sequence of Term
-        Exchanges that the spots have been moved by already: their groups are left alone.
+        Shifts by other effects, source frame, where the spots are written [mm].
     """
     if observations.frames is None or len(observations) < LEAST_SPOTS:
         return FrameSearch(observations)
@@ -196,7 +194,7 @@ def find_wrong_frames(
     effects: list[Effect] = []
     unproved: tuple[Term, ...] = ()
     while len(terms) < _MOST:
-        taken = [rows_of(observations, term) for term in (*before, *terms)]
+        taken = [rows_of(observations, term) for term in terms]
         step = _best(question(at_frames(observations, terms)), taken)
         if step is None:
             break
@@ -209,7 +207,7 @@ def find_wrong_frames(
     if len(terms) > 1:  # each is judged again where the others are right: they were no rivals
         for place, term in enumerate(terms):
             others = [other for other in terms if other is not term]
-            taken = [rows_of(observations, other) for other in (*before, *others)]
+            taken = [rows_of(observations, other) for other in others]
             again = _best(question(at_frames(observations, others)), taken)
             if again is not None and again[1] is not None and again[0].where == term.where:
                 effects[place] = again[1]
@@ -217,14 +215,13 @@ def find_wrong_frames(
 
 
 def _seen_at(observations: Observations, terms: Sequence[Term]) -> Observations:
-    """Spots where the frames found put them; another base, the same joints: these are not known any more."""
-    there = at_frames(observations, terms)
-    bases = np.zeros(len(there), dtype=np.bool_)
+    """Spots where the frames found put them; without joints where the robot that is known cannot reach them."""
     for term in terms:
-        if term.where["frame"] != "tool":
-            bases |= rows_of(observations, term)
-    apart = np.linalg.norm(there.positions - observations.positions, axis=1)[bases]
-    return there if float(apart.max(initial=0.0)) <= _FAR_MM else replace(there, joints=None, measured_joints=None)
+        reached = observations.joints is None or joints_under(observations, term) is not None
+        observations = at_frames(observations, [term])
+        if not reached:
+            observations = replace(observations, joints=None, measured_joints=None)
+    return observations
 
 
 def _groups(question: _Question) -> list[_Group]:
@@ -274,7 +271,8 @@ def _best(question: _Question, taken: list[Mask]) -> tuple[Term, Effect | None] 
         return None
     noise = max(min(each.fit.scale for each in tries), _FLOOR_MM)
     costs = np.array([each.cost(noise, question.same_frame) for each in tries])
-    best = tries[int(np.argmin(costs))]
+    equal = [place for place in np.argsort(costs).tolist() if costs[place] < costs.min() + CLEAR]
+    best = tries[min(equal, key=lambda place: int(tries[place].group.spots.sum()))]  # that the fewest are wrong
     gain = _cost(question.plain, question.observations.positions, noise, question.same_frame) - float(costs.min())
     left = _left(question, best)
     tolerance = left.size + left.width
@@ -340,9 +338,7 @@ def _left(question: _Question, one: _Try) -> _Left:
     spots, fit, tool = one.group.spots, one.fit, one.exchange.kind == "tool"
     rotation, places = fit.rigid.rotation, fit.rigid.predict(one.points)
     residuals = fit.rigid.residuals
-    moved = float(np.sqrt(np.mean(np.sum((one.points - question.observations.positions)[spots] ** 2, axis=1))))
-    allowed = max(fit.threshold, _LARGE * moved)
-    used = fit.inliers | (spots & (np.linalg.norm(residuals, axis=1) <= allowed))
+    used = fit.inliers & ~spots | _together(question, one)
     extent = max(float(np.sqrt(np.mean((places - places.mean(axis=0)) ** 2))), 1.0)
     middle = places[spots].mean(axis=0)
     rigid = jacobian((places - middle) / extent)
@@ -375,6 +371,19 @@ def _left(question: _Question, one: _Try) -> _Left:
         turn @ values[:3],
         np.sqrt(np.maximum(np.diag(turn @ spread[:3, :3] @ turn.T), 0.0)),
     )
+
+
+def _together(question: _Question, one: _Try) -> Mask:
+    """Spots (n,) of a group that lie off alike: not those that are off by themselves, whatever the group is off."""
+    spots, residuals = one.group.spots, one.fit.rigid.residuals
+    if one.exchange.kind == "tool" and question.observations.rotations is not None:
+        residuals = question.observations.rotations.inv().apply(residuals @ one.fit.rigid.rotation)
+    elif spots.all():
+        residuals = one.points - question.reference
+    apart = np.linalg.norm(residuals - np.median(residuals[spots], axis=0), axis=1)
+    moved = _shifts_of(question, one.group, one.exchange)[1]
+    alike: Mask = spots & (apart <= max(one.fit.threshold, _LARGE * moved))
+    return alike
 
 
 def _chance(question: _Question, groups: list[_Group], best: _Try, left: _Left) -> float:
