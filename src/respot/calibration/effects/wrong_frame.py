@@ -105,9 +105,9 @@ def _possible(listed: Mapping[str, ListedFrame], kind: FrameKind, written: Liste
 
 
 def _near(one: RigidTransform, other: RigidTransform) -> bool:
-    apart = one.inv() * other
-    turned = float(np.degrees(apart.rotation.magnitude()))
-    return float(np.linalg.norm(apart.translation)) <= SAME_MM and turned <= SAME_DEG
+    if float(np.linalg.norm(np.asarray(one.translation) - np.asarray(other.translation))) > SAME_MM:
+        return False
+    return float(np.degrees((one.rotation.inv() * other.rotation).magnitude())) <= SAME_DEG
 
 
 def moved_by(exchange: Exchange, positions: Array, rotations: Rotation | None) -> tuple[Array, Rotation | None]:
