@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 MOST_EFFECTS, SPOTS_FOR_AN_EFFECT = 12, 12
+_USED = 0.5
+"""Share of the coordinates that directions of the model may use up: with more there is no noise left to judge by."""
 _LAST = 10.0
 """A term that only describes must be better by this much (as `Selection.criterion`) than one that may be a cause."""
 _POINTS = 8.0
@@ -30,6 +32,8 @@ _KEPT = 200
 _LARGE = 5
 """Terms with more directions than this may stand for several causes at once."""
 _CANDIDATES = 12
+_NEEDED = 50.0
+"""What makes the criterion so much smaller is not left out, whatever its chance beside terms that hold much of it."""
 OBVIOUS = 12.0
 """Scores beyond this never come by chance: where only yes or no is asked, no permutations are needed."""
 _ROUNDS = 6
@@ -183,7 +187,7 @@ class Selection:
         gains = self.gains(rest)
         after = np.maximum(rest.square_sum - gains.squares, 0.0)
         found = self.criterion(after, gains.ranks, gains.sizes, _AKAIKE)
-        usable = self.allowed & (gains.ranks > 0) & ~self._taken(rest)
+        usable = self._usable(rest, gains)
         return np.where(usable, found - found[index], np.inf)
 
     def beside(self, state: State) -> Array:
@@ -192,7 +196,12 @@ class Selection:
         after = np.maximum(state.square_sum - gains.squares, 0.0)
         cost = state.cost + self.handicap + gains.sizes
         found = self.criterion(after, gains.ranks + state.rank, cost)
-        return np.where(self.allowed & (gains.ranks > 0) & ~self._taken(state), found, np.inf)
+        return np.where(self._usable(state, gains), found, np.inf)
+
+    def _usable(self, state: State, gains: Gains) -> Mask:
+        """Terms that may be added to a state, say something beside it, and leave enough to judge by."""
+        room = int(_USED * self.count) - 6 - state.rank
+        return np.asarray(self.allowed & (gains.ranks > 0) & (gains.ranks <= room) & ~self._taken(state))
 
     def _taken(self, state: State) -> Mask:
         """Terms that are in a state, in any form, and covariates whose column a cause in it follows already."""
@@ -237,7 +246,7 @@ class Selection:
 
     def _next(self, state: State, among: Mask | None) -> int | None:
         gains = self.gains(state)
-        allowed = self.allowed & ~self._taken(state) & (gains.ranks > 0)
+        allowed = self._usable(state, gains)
         if among is not None:
             allowed &= among
         if not allowed.any():
@@ -279,13 +288,13 @@ class Selection:
         score = self.scores(rest, gains)
         if score[index] >= OBVIOUS:
             return 1.0 / (1.0 + self.draws)
-        chance = self._chance(rest, self.allowed & ~self._taken(rest))
+        chance = self._chance(rest, self._usable(rest, gains))
         return p_value(float(chance.scores(score, self._effects)[index]), chance)
 
     def chances(self, state: State) -> Array:
         """P value (terms,) of each term that is not in a state, were it added; 1 for those that cannot be."""
         gains = self.gains(state)
-        allowed = self.allowed & ~self._taken(state) & (gains.ranks > 0)
+        allowed = self._usable(state, gains)
         if not allowed.any():
             return np.ones(len(self.bank))
         chance = self._chance(state, allowed)
@@ -364,7 +373,8 @@ class Selection:
             worst, worst_p = None, ALPHA
             for index in state.chosen:
                 rest = self.state([i for i in state.chosen if i != index], self.sigma(state))
-                if self.scores(rest, self.gains(rest))[index] >= OBVIOUS:
+                certain = self.scores(rest, self.gains(rest))[index] >= OBVIOUS
+                if certain or rest.criterion > state.criterion + _NEEDED:
                     continue
                 chance = self.chance_of(state, index)
                 if chance > worst_p:
