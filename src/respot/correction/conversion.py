@@ -14,7 +14,8 @@ from respot.calibration.calibration import Calibration
 from respot.calibration.report import report
 from respot.calibration.source_fit import FitOptions, SourceFit, fit_source
 from respot.calibration.stored import load_calibration, source_issues
-from respot.correction.correction import Correction, align
+from respot.correction.correction import Correction, correct
+from respot.correction.image import RigidImage
 from respot.correction.options import CorrectionOptions
 from respot.issues import BadInputError, Issue
 from respot.languages import LANGUAGES
@@ -164,7 +165,8 @@ def convert(
         message = f"holds none of the spots that the calibration was fitted to{detail}"
         raise BadInputError("NO_COMMON_IDS", message, str(source))
     language = LANGUAGES[read.robot.language].with_plant(read.backup.profiles if read.backup is not None else ())
-    correction = align(read.robot, language, model.source2reference, model.content_hash, moves, options)
+    image = RigidImage(model.source2reference)
+    correction = correct(read.robot, language, image, model.kind, model.content_hash, moves, options)
     refused = [
         Issue(refusal.code, f"{refusal.target}: {refusal.message}", refusal.path, refusal.line)
         for refusal in correction.refused

@@ -13,12 +13,11 @@ from scipy.spatial.transform import RigidTransform
 from respot import __version__
 from respot.calibration.region import outside
 from respot.correction.configuration import configure
+from respot.correction.image import Image
 from respot.correction.options import CorrectionOptions
 from respot.correction.points import (
     PointEdit,
     moves_at_all,
-    new_offset,
-    new_pose,
     offset_edit,
     point_edit,
     printed_pose,
@@ -102,15 +101,16 @@ class Correction:
         return self.scope.stays
 
 
-def align(
+def correct(
     robot: Robot,
     language: Language,
-    source2reference: RigidTransform,
+    image: Image,
+    kind: str,
     calibration_hash: str,
     spot_moves: Sequence[Move],
     options: CorrectionOptions,
 ) -> Correction:
-    """Write programs whose targets are the model's image of the old ones.
+    """Write programs whose targets are the image of the old ones.
 
     Parameters
     ----------
@@ -118,10 +118,12 @@ def align(
         The robot.
     language : Language
         Its language, with the instruction forms that the robot was read with.
-    source2reference : RigidTransform
-        The model.
+    image : Image
+        What becomes of each target.
+    kind : str
+        ``theory`` or ``measured``: what the calibration's reference is.
     calibration_hash : str
-        What tells this calibration from others.
+        What tells this calibration, and the way it is applied, from others.
     spot_moves : sequence of Move
         Motions of the matched spots that the model was fitted to.
     options : CorrectionOptions
@@ -135,20 +137,21 @@ def align(
     _refuse_twice(robot, calibration_hash)
     _check_options(robot, options)
     scope = find_scope(robot, spot_moves, options.programs)
-    after = {id(moving): new_pose(moving, source2reference) for moving in scope.moving}
+    unseen = image.see(scope)
+    after = {id(moving): image.pose(moving) for moving in scope.moving}
     moving = [item for item in scope.moving if _moves(item, after[id(item)])]
-    refused = [*scope.refusals, *_too_far(moving, after, options)]
+    refused = [*scope.refusals, *unseen, *_too_far(moving, after, options)]
     cell = cell_of(robot.machine, robot.language, options.robot)
     printed = {id(item): _printed(robot, language, item, after[id(item)]) for item in moving}
     configured = _configure(cell, moving, printed, language, options, refused)
-    flight = Preflight(cell, robot, language, scope, {id(i.target): printed[id(i)] for i in moving}, source2reference)
+    flight = Preflight(cell, robot, language, scope, {id(i.target): printed[id(i)] for i in moving}, image.offset)
     checked, kept, refused_programs = _preflight(flight, scope, moving, options, refused)
-    edits = _edits(robot, language, options, kept, moving, after, configured, scope, source2reference)
-    header = _Header("align", "theory", calibration_hash)
+    edits = _edits(robot, language, options, kept, moving, after, configured, scope, image)
+    header = _Header(image.direction, kind, calibration_hash)
     return Correction(
         robot=robot,
         language=language,
-        direction="align",
+        direction=image.direction,
         calibration_hash=calibration_hash,
         scope=scope,
         edits=edits,
@@ -157,7 +160,7 @@ def align(
         transitions=_transitions(robot, scope, {id(i.target) for i in moving if not kept.holds(i)}, refused_programs),
         files=_changed_files(robot, language, options, edits, header),
         reconfigured=all(id(item) in configured for item in moving if language.has_configuration(item.target)),
-        issues=[*_issues(robot, cell, scope, moving, spot_moves, edits), *checked.issues],
+        issues=[*_issues(robot, cell, scope, moving, spot_moves, edits), *image.issues, *checked.issues],
     )
 
 
@@ -223,14 +226,8 @@ def _too_far(
         turn = float(turn_deg(item.target.pose, after[id(item)]))
         if shift > furthest or turn > widest:
             message = f"would move {shift:.1f} mm and {turn:.2f} degrees; --max-shift allows {furthest:g},{widest:g}"
-            found += _refusals(item, "SHIFT_TOO_LARGE", message)
+            found += item.refusals("SHIFT_TOO_LARGE", message)
     return found
-
-
-def _refusals(moving: Moving, code: str, message: str) -> list[Refusal]:
-    """One refusal for each program that goes to the target."""
-    first = {move.program: move for move in reversed(moving.moves)}
-    return [Refusal(name, moving.target.name, code, message, move.path, move.line) for name, move in first.items()]
 
 
 def _configure(
@@ -249,7 +246,7 @@ def _configure(
         if not result.code:
             found[id(item)] = result.values
         elif not (options.keep_config and result.code in _KEPT):
-            refused += _refusals(item, result.code, f"{result.message}{_hint(result.code)}")
+            refused += item.refusals(result.code, f"{result.message}{_hint(result.code)}")
     return found
 
 
@@ -297,7 +294,7 @@ def _edits(
     after: Mapping[int, RigidTransform],
     configured: Mapping[int, Mapping[str, float]],
     scope: Scope,
-    source2reference: RigidTransform,
+    image: Image,
 ) -> list[PointEdit]:
     made = templates(language.name, options.templates)
     edits: list[PointEdit | None] = []
@@ -307,10 +304,11 @@ def _edits(
             edits.append(point_edit(item, after[id(item)], configured.get(id(item), {}), text, language, made))
     # one offset that a call hands to a routine with several motions is one literal
     offsets = {(move.offset.path, move.offset.span): move for move in scope.offsets if move.offset is not None}
-    for move in offsets.values():
-        if not kept((move.program,), str(move.target)) and move.offset is not None and move.base2spots is not None:
-            values = new_offset(move.offset, move.base2spots, source2reference)
-            edits.append(offset_edit(move, values, robot.files[move.offset.path].source.text, made))
+    edits += [
+        offset_edit(move, image.offset(move), robot.files[move.offset.path].source.text, made)
+        for move in offsets.values()
+        if not kept((move.program,), str(move.target)) and move.offset is not None and move.base2spots is not None
+    ]
     return [edit for edit in edits if edit is not None]
 
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
-from respot.correction.points import new_offset
 from respot.geometry import IDENTITY, Array
 from respot.kinematics.cell import Reason, RobotCell
 from respot.kinematics.configuration import all_solutions, nearest_inside, taught_joints
@@ -76,8 +75,8 @@ class Places:
         The routines.
     printed : mapping of int to RigidTransform
         New poses in their base by `id` of the target.
-    source2reference : RigidTransform
-        The correction.
+    offset : callable
+        New components (3,) of the offset of a motion along its base [mm].
     """
 
     def __init__(
@@ -87,10 +86,10 @@ class Places:
         language: Language,
         routines: Sequence[Routine],
         printed: Mapping[int, RigidTransform],
-        source2reference: RigidTransform,
+        offset: Callable[[Move], Array],
     ) -> None:
         self._cell, self._model, self._language = cell, model, language
-        self._printed, self._correction = printed, source2reference
+        self._printed, self._offset = printed, offset
         self.by_move: dict[int, Place] = {}
         #: Motions to a target without a place, and why.
         self.unknown: list[tuple[Move, Target, Reason]] = []
@@ -154,8 +153,7 @@ class Places:
         if move.base2spots is None:
             return None
         old = np.array([0.0 if number is None else float(number.value) for number in move.offset.numbers])
-        turned = new_offset(move.offset, move.base2spots, self._correction)
-        return _Posed(move, target, own, _shifted(before, old), _shifted(after, turned))
+        return _Posed(move, target, own, _shifted(before, old), _shifted(after, self._offset(move)))
 
     def _start(
         self, move: Move, last: _Posed | None

@@ -6,7 +6,7 @@ What a correction brings nearer to a singularity or a limit, or onto another bra
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,8 +14,8 @@ from scipy.spatial.transform import RigidTransform
 
 from respot.correction.joints import Place, Places
 from respot.correction.scope import Refusal, Scope
-from respot.correction.sequence import sequences
-from respot.geometry import IDENTITY, Array
+from respot.correction.sequence import goes_somewhere, sequences
+from respot.geometry import Array
 from respot.issues import Issue
 from respot.kinematics.cell import Reason, RobotCell
 from respot.kinematics.opw import OpwRobot
@@ -56,8 +56,8 @@ class Preflight:
         What moves.
     printed : mapping of int to RigidTransform
         New poses in their base as they will be printed, by `id` of the target.
-    source2reference : RigidTransform
-        The correction.
+    offset : callable
+        New components (3,) of the offset of a motion along its base [mm].
     """
 
     def __init__(
@@ -67,17 +67,17 @@ class Preflight:
         language: Language,
         scope: Scope,
         printed: Mapping[int, RigidTransform],
-        source2reference: RigidTransform,
+        offset: Callable[[Move], Array],
     ) -> None:
         self._cell: RobotCell | None = None
         if isinstance(cell, RobotCell) and isinstance(cell.model, OpwRobot):
             self._cell, self._model = cell, cell.model
             self._sequences = [
-                [move for move in sequence if _goes_somewhere(move)] for sequence in sequences(robot, scope.routines)
+                [move for move in sequence if goes_somewhere(move)] for sequence in sequences(robot, scope.routines)
             ]
             called = {id(move) for sequence in self._sequences for move in sequence}
             routines = [r for r in robot.routines if any(id(move) in called for move in r.moves)]
-            self._places = Places(cell, cell.model, language, routines, printed, source2reference)
+            self._places = Places(cell, cell.model, language, routines, printed, offset)
 
     def check(self, moved: Collection[int]) -> Checked:
         """Check with the targets ``moved``, by `id`, at their new place and all others at their old one."""
@@ -144,12 +144,6 @@ class Preflight:
         count = "the motion" if len(left) == 1 else f"{len(left)} motions, the first"
         message = f"reach, limits and joint travel of {count} to {move.target}: {reason}"
         return [Issue("NOT_CHECKED", message, move.path, move.line)]
-
-
-def _goes_somewhere(move: Move) -> bool:
-    """Whether a motion goes to a target, away from the last position, or nobody knows where."""
-    relative = move.offset is not None or move.tool_offset is not IDENTITY
-    return move.target is not None or relative or bool(move.unknown)
 
 
 def _refusal(move: Move, place: Place, reason: Reason) -> Refusal:

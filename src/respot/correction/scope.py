@@ -62,6 +62,11 @@ class Moving:
         """Programs that go to the target."""
         return {move.program for move in self.moves}
 
+    def refusals(self, code: str, message: str) -> list[Refusal]:
+        """One refusal for each program that goes to the target."""
+        first = {move.program: move for move in reversed(self.moves)}
+        return [Refusal(name, self.target.name, code, message, move.path, move.line) for name, move in first.items()]
+
 
 @dataclass
 class Scope:

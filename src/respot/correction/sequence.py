@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 
+from respot.geometry import IDENTITY
 from respot.program.moves import Move
 from respot.program.robot import Robot, Routine
 
@@ -21,6 +22,12 @@ def sequences(robot: Robot, routines: Sequence[Routine]) -> Iterator[list[Move]]
         calls.setdefault((routine.task, routine.name.lower()), routine)
     for routine in routines:
         yield list(islice(_motions(routine, calls, ()), _LONGEST_SEQUENCE))
+
+
+def goes_somewhere(move: Move) -> bool:
+    """Whether a motion goes to a target, away from the last position, or nobody knows where."""
+    relative = move.offset is not None or move.tool_offset is not IDENTITY
+    return move.target is not None or relative or bool(move.unknown)
 
 
 def _motions(routine: Routine, calls: Mapping[tuple[str, str], Routine], above: tuple[int, ...]) -> Iterator[Move]:
