@@ -88,7 +88,7 @@ CODES: dict[str, tuple[Level, str]] = {
     "ABSOLUTE_ACCURACY": (_W, "the controller compensates the arm's own errors: effects of the arm are refused"),
     # comparing two states
     "DIFFERENT_ROBOTS": (_E, "two sources hold no robot, or no language, in common"),
-    "RUN_TIME_FRAME": (_I, "a tool or base differs whose value the program writes while it runs"),
+    "RUN_TIME_FRAME": (_W, "a tool, base or target differs whose value the program writes while it runs"),
     "OTHER_ROBOT_COMPARED": (_W, "two robots with different serial numbers are compared"),
     # using a stored calibration
     "EFFECT_LEFT_OUT": (_W, "a column that an effect follows is not known: the effect is left out"),

@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from scipy.spatial.transform import RigidTransform
 
+from respot.program.robot import Robot
 from respot.program.statement import Statement
 from respot.source import Span
+
+#: A part of a datum in upper case: its name, then indices and names of fields.
+Path = tuple[str, ...]
+#: An index that is computed: any element.
+ANY = "*"
+_HEAD = re.compile(r"[\w$]+")
+_STEP = re.compile(r"[\[{]([^\]}]*)[\]}]|\.\s*([\w$]+)")
 
 #: What statements are about, the most important first.
 RANK = ("motion", "target", "weld", "speed", "zone", "io", "frame", "call", "flow", "wait", "data", "header", "unread")
@@ -17,6 +26,18 @@ RANK = ("motion", "target", "weld", "speed", "zone", "io", "frame", "call", "flo
 def ranked(abouts: Iterable[str]) -> tuple[str, ...]:
     """Return what some statements are about, each once, the most important first."""
     return tuple(sorted(dict.fromkeys(abouts), key=lambda about: RANK.index(about) if about in RANK else len(RANK)))
+
+
+def path_of(text: str) -> Path:
+    """Return the path of a part: ``A{2}.TRANS`` is ``("A", "2", "TRANS")``."""
+    head = _HEAD.match(text)
+    steps = [] if head is None else [head[0].upper()]
+    for match in _STEP.finditer(text, 0 if head is None else head.end()):
+        if match[2]:
+            steps.append(match[2].upper())
+        elif match[1].strip():
+            steps += [part if part.isdecimal() else ANY for part in "".join(match[1].split()).split(",")]
+    return tuple(steps)
 
 
 @dataclass(frozen=True)
@@ -84,6 +105,18 @@ class Dialect:
         Whether a controller saves the value that a datum of this declaration has while the robot runs.
     typed : callable
         Whether the spelling of a datum's value shows that a person wrote it, not the controller.
+    values : callable
+        Every value that a declaration gives, by the part of the datum that it is the value of.
+    local_data, writing : frozenset of str
+        Kinds of statements that declare a name in a routine, and of those that give a datum a value.
+    left : re.Pattern
+        Finds what such a statement writes: its last group that matched, or the whole match.
+    precise : bool
+        Whether the reading knows that code changes a datum; otherwise it may be that nobody knows.
+    writers : frozenset of str
+        Routines of the system, in upper case, that write into their arguments.
+    first_is_main : bool
+        Whether the first routine of a file is the one that is started.
     """
 
     heads: frozenset[str]
@@ -101,3 +134,10 @@ class Dialect:
     companions: Callable[[str], Sequence[str]]
     persistent: Callable[[Statement], bool]
     typed: Callable[[Statement], bool]
+    values: Callable[[str, Statement, Robot], Mapping[Path, str]]
+    local_data: frozenset[str]
+    writing: frozenset[str]
+    left: re.Pattern[str]
+    precise: bool
+    writers: frozenset[str] = frozenset()
+    first_is_main: bool = False

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
-from respot.difference.dialect import Datum, Dialect, FrameValue, ranked
+from respot.difference.dialect import Datum, Dialect, FrameValue, Path, path_of, ranked
 from respot.geometry import pose, rotation_from_abc
 from respot.languages.krl.forms import FORMS
 from respot.languages.krl.symbols import Aggregate, Symbol, read_symbols
 from respot.languages.krl.syntax import COMMENT, END_FOLD, FOLD
-from respot.program.statement import Statement
+from respot.program.robot import Robot
+from respot.program.statement import OPAQUE, Statement
 from respot.program.targets import Number
 
 _POSE = ("X", "Y", "Z", "A", "B", "C")
@@ -43,6 +44,7 @@ _POINTS = frozenset(("POS", "E6POS", "E3POS", "AXIS", "E6AXIS", "E3AXIS"))
 _IO = re.compile(r"\$(?:IN|OUT|ANIN|ANOUT|DIGIN|DIGOUT)\b|\bPULSE\b", re.IGNORECASE)
 _ZONES = frozenset(("C_PTP", "C_DIS", "C_ORI", "C_VEL", "C_SPL"))
 _COUNTER = re.compile(r"&\s*(?:REL|COMMENT)\b", re.IGNORECASE)
+_LEFT_SIDE = re.compile(r"(?<![\w$.#])([\w$]+(?:\s*\[[^\]]*\]|\s*\.\s*\w+)*)\s*=(?!=)")
 #: What a point X10 is named with: tool and base, velocity of PTP and of CP.
 _COMPANIONS = ("F", "PP", "LL", "P", "L")
 
@@ -86,6 +88,19 @@ def _flat(value: Aggregate, prefix: str) -> Iterator[tuple[str, float | str]]:
             yield from _flat(member, f"{prefix}{name}.")
         else:
             yield prefix + name, float(member.value) if isinstance(member, Number) else member
+
+
+def _values(path: str, statement: Statement, robot: Robot) -> Mapping[Path, str]:
+    del robot
+    found: dict[Path, str] = {}
+    for symbol in _symbols(path, statement):
+        start = path_of(symbol.name)
+        value = symbol.value
+        if isinstance(value, Aggregate):
+            found.update({(*start, *name.upper().split(".")): str(item) for name, item in _flat(value, "")})
+        elif value is not None:
+            found[start] = str(float(value.value)) if isinstance(value, Number) else str(value)
+    return found
 
 
 def _noise(statement: Statement, declared: Sequence[Datum]) -> str:
@@ -187,4 +202,11 @@ KRL = Dialect(
     companions=_companions,
     persistent=lambda _: True,  # a data list is the controller's own memory
     typed=lambda _: False,
+    values=_values,
+    local_data=frozenset(("declaration",)),
+    writing=frozenset(("assignments", "trigger", "interrupt_declaration", "for_", OPAQUE)),
+    left=_LEFT_SIDE,
+    precise=False,  # what is handed to a routine that is not there counts as changed
+    writers=frozenset(("CREAD", "SREAD", "SWRITE", "CAST_FROM", "CAST_TO", "MBX_REC", "MD_GETSTATE")),
+    first_is_main=True,
 )

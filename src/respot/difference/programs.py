@@ -5,7 +5,7 @@ Statements that are written the same are paired by hashing alone; only what is l
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -141,11 +141,13 @@ class FilePair:
         names = [datum.name for datum in side.declared(statement)]
         return tuple(side.names.get(name, name) for name in names) if names else ("", *side.key(statement)[:3])
 
-    def rename_routines(self, names: Mapping[str, str]) -> list[tuple[Part, Part]]:
+    def rename_routines(
+        self, names: Mapping[str, str], is_still_used: Callable[[str], bool]
+    ) -> list[tuple[Part, Part]]:
         """Pair routines that only differ by their names; they are removed and added no longer."""
         bodies: dict[tuple[Key, ...], list[Part]] = {}
         for part in self.removed:
-            if part.size > 2:
+            if part.size > 2 and not is_still_used(part.title.upper()):
                 bodies.setdefault(part.body_key(names), []).append(part)
         found = []
         for part in list(self.added):

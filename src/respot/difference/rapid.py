@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from respot.difference.canonical import plain_tokens
-from respot.difference.dialect import Datum, Dialect, FrameValue, ranked
+from respot.difference.dialect import Datum, Dialect, FrameValue, Path, ranked
 from respot.languages.rapid.calls import read_lines
 from respot.languages.rapid.forms import FORMS, InstructionForm, instruction_form
 from respot.languages.rapid.machine import read_tool, read_work_object
 from respot.languages.rapid.records import BUILT_IN
 from respot.languages.rapid.symbols import Aggregate, Symbol, Value, data_symbol
 from respot.languages.rapid.syntax import AFTER_MODULE, COMMENT
-from respot.program.statement import Statement
+from respot.program.robot import Robot
+from respot.program.statement import OPAQUE, Statement
 from respot.program.targets import Number
 
 _FLOW = frozenset(
@@ -46,6 +47,12 @@ _OPTIONS = {
     "id": "motion", "conc": "motion", "noeoffs": "motion", "corr": "motion",
 }  # fmt: skip
 _ORDER = ("motion", "target", "speed", "zone", "weld", "frame", "io", "call")
+#: Left of ``:=``, unless it names an argument, and what RobotWare's counting instructions count.
+_LEFT_SIDE = re.compile(
+    r"\b(?:Add|Incr|Decr|Clear|BitSet|BitClear)\s+([^\W\d]\w*(?:\s*\{[^}]*\}|\s*\.\s*\w+)*)"
+    r"|(?<![\w.\\])([^\W\d]\w*(?:\s*\{[^}]*\}|\s*\.\s*\w+)*)\s*:=",
+    re.IGNORECASE,
+)
 #: A blank after a comma of a value: a controller that saves a persistent datum writes none.
 _TYPED = re.compile(r",[ \t]")
 
@@ -102,6 +109,45 @@ def _flat(value: Value, kind: str, prefix: str) -> Iterator[tuple[str, float | s
             yield from _flat(item, inner, f"{prefix}{name}.")
     else:
         yield prefix.rstrip("."), float(value.value) if isinstance(value, Number) else str(value).upper()
+
+
+def _values(path: str, statement: Statement, robot: Robot) -> Mapping[Path, str]:
+    symbol = _symbol(path, statement)
+    if symbol is None or symbol.value is None:
+        return {}
+    found: dict[Path, str] = {}
+    waiting: list[tuple[Path, Value, str, int]] = [
+        ((symbol.name.upper(),), symbol.value, symbol.type, symbol.dimensions)
+    ]
+    while waiting:
+        place, value, kind, dimensions = waiting.pop()
+        if not isinstance(value, Aggregate):
+            found[place] = str(float(value.value)) if isinstance(value, Number) else str(value)
+            continue
+        known = () if dimensions else BUILT_IN.get(kind) or _record(robot, kind)
+        for index, item in enumerate(value.items):
+            inner, name = known[index] if len(known) == len(value.items) else (kind if dimensions else "", "")
+            step = name.upper() or (str(index + 1) if dimensions else f"#{index + 1}")
+            waiting.append(((*place, step), item, inner, max(0, dimensions - 1)))
+    return found
+
+
+def _record(robot: Robot, kind: str) -> Sequence[tuple[str, str]]:
+    """Return type and name of each field of a record that a module of the robot declares."""
+    word = re.compile(rf"\bRECORD\s+{re.escape(kind)}\b", re.IGNORECASE)
+    for file in robot.files.values():
+        if kind and word.search(file.source.text) is not None:
+            inside = False
+            fields: list[tuple[str, str]] = []
+            for statement in file.statements:
+                if statement.kind == "record":
+                    inside = _name_of(statement).lower() == kind
+                elif statement.kind == "end_record" and inside:
+                    return fields
+                elif inside and statement.kind != COMMENT:
+                    tokens = plain_tokens(statement)
+                    fields.append((tokens[0].lower(), tokens[1] if len(tokens) > 1 else ""))
+    return ()
 
 
 def _noise(statement: Statement, declared: Sequence[Datum]) -> str:
@@ -212,4 +258,9 @@ RAPID = Dialect(
     companions=_companions,
     persistent=_persistent,
     typed=_typed,
+    values=_values,
+    local_data=frozenset(("data",)),
+    writing=frozenset(("assignment", "compact_if", "call", OPAQUE)),
+    left=_LEFT_SIDE,
+    precise=True,
 )

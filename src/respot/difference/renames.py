@@ -9,16 +9,21 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from operator import attrgetter
 
 from respot.difference.canonical import Key, key
+from respot.difference.dialect import Dialect
 from respot.difference.findings import Place, Renamed
 from respot.difference.programs import DataPair, FilePair, Side
+from respot.program.robot import Robot
 from respot.program.statement import Statement
 from respot.program.targets import Target
 from respot.tolerance import RENAMED_WITHIN_MM
 
 _WORD = re.compile(r"[^\W\d][\w$]*|\$\w+")
+_STRING = re.compile(r'"[^"\r\n]*"')
 _HERE = "<name>"
+_ROUTINES = (attrgetter("removed"), attrgetter("added"))
 #: A use: the routine, what the statement says without the name.
 _Use = tuple[str, Key]
 
@@ -48,29 +53,60 @@ class Renames:
     ----------
     files : iterable of FilePair
         Its files, their declarations paired by name.
+    old, new : Robot
+        Both states, with the files that did not change.
     """
 
-    def __init__(self, files: Iterable[FilePair]) -> None:
+    def __init__(self, files: Iterable[FilePair], old: Robot, new: Robot) -> None:
         self._files = list(files)
         #: what was found, in order
         self.found: list[Renamed] = []
-        #: new name in upper case by old name
-        self.names: dict[str, str] = {}
-        self._data()
-        self._routines()
-
-    def _data(self) -> None:
+        self._names: dict[str, str] = {}
+        self._program: dict[str, str] = {}
         removed = [lone for file in self._files for lone in _lones(file, file.old, removed=True)]
         added = [lone for file in self._files for lone in _lones(file, file.new, removed=False)]
-        if not removed or not added:
+        routines = [[part.title.upper() for file in self._files for part in side(file)] for side in _ROUTINES]
+        if not (removed and added) and not all(routines):
             return
+        dialect = self._files[0].old.dialect
+        names = {lone.name for lone in (*removed, *added)}.union(*routines)
+        self._mentions = [_Mentions.of(robot, dialect, names) for robot in (old, new)]
+        removed = [lone for lone in removed if not self._is_still_used(lone.name)]
+        if removed and added:
+            self._data(removed, added)
+        self._routines()
+
+    def names_for(self, file: FilePair) -> Mapping[str, str]:
+        """Return what names mean in a file, new name by old name, both in upper case.
+
+        A name of one program may be that of another datum in another program: it stands for the new one only where
+        nothing else has either name.
+        """
+        program = file.new.file.program
+        return {
+            old: new
+            for old, new in self._names.items()
+            if self._program[old] == program
+            or not any(
+                mentions.declared.get(name, set()) - {self._program[old]}
+                for mentions in self._mentions
+                for name in (old, new)
+            )
+        }
+
+    def _is_still_used(self, name: str) -> bool:
+        """Whether the new programs use an old name that nothing there has: then it did not become another one."""
+        new = self._mentions[1]
+        return bool(new.used.get(name, set())) and not new.declared.get(name)
+
+    def _data(self, removed: Sequence[_Lone], added: Sequence[_Lone]) -> None:
         _find_uses(removed, [file.old for file in self._files])
         _find_uses(added, [file.new for file in self._files])
         left_old, left_new = _Left(removed), _Left(added)
         points = [(lone for lone in left if lone.target is not None) for left in (left_old, left_new)]
         self._by_value(list(points[0]), list(points[1]), left_old, left_new)
         self._by_place(left_old, left_new)
-        for old_name, new_name in list(self.names.items()):
+        for old_name, new_name in list(self._names.items()):
             self._follow(old_name, new_name, left_old, left_new)
         # what is named after a point is renamed with it or not at all: its values are those of many
         forms = {
@@ -113,7 +149,8 @@ class Renames:
     def _take(self, old: _Lone, new: _Lone, left_old: _Left, left_new: _Left) -> None:
         left_old.drop(old)
         left_new.drop(new)
-        self.names[old.name] = new.name
+        self._names[old.name] = new.name
+        self._program[old.name] = new.side.file.program
         old.data.removed = [item for item in old.data.removed if item is not old.statement]
         new.data.added = [item for item in new.data.added if item is not new.statement]
         new.data.pairs.append((old.statement, new.statement))
@@ -123,11 +160,39 @@ class Renames:
 
     def _routines(self) -> None:
         for file in self._files:
-            for old, new in file.rename_routines(self.names):
+            for old, new in file.rename_routines(self._names, self._is_still_used):
                 assert old.head is not None and new.head is not None  # noqa: S101 - a part that is paired has one
-                self.names[old.title.upper()] = new.title.upper()
+                self._names[old.title.upper()] = new.title.upper()
+                self._program[old.title.upper()] = file.new.file.program
                 places = (Place(file.old.path, old.head.line), Place(file.new.path, new.head.line))
                 self.found.append(Renamed(old.title, new.title, new.head.kind, file.new.file.program, *places))
+
+
+@dataclass(frozen=True)
+class _Mentions:
+    """Which programs of a robot declare some names, and which use them, by the name in upper case."""
+
+    declared: dict[str, set[str]]
+    used: dict[str, set[str]]
+
+    @classmethod
+    def of(cls, robot: Robot, dialect: Dialect, names: set[str]) -> _Mentions:
+        """Look for names in all statements that are no comments."""
+        found = cls({}, {})
+        for file in robot.files.values():
+            if names.isdisjoint(_WORD.findall(file.source.text.upper())):
+                continue
+            head = ""
+            for statement in file.statements:
+                kind = statement.kind
+                if kind in dialect.comments or kind in dialect.folds:
+                    continue
+                head = kind if kind in dialect.heads else "" if kind in dialect.ends else head
+                words = names.intersection(_WORD.findall(_STRING.sub('""', statement.source).upper()))
+                declares = kind in dialect.heads or kind in dialect.local_data or head in dialect.data_heads
+                for word in words:
+                    (found.declared if declares else found.used).setdefault(word, set()).add(file.program)
+        return found
 
 
 class _Left:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from respot.difference.alignment import increasing
@@ -10,7 +10,8 @@ from respot.difference.blocks import Block, moved_blocks
 from respot.difference.canonical import key
 from respot.difference.dialect import ranked
 from respot.difference.dialects import DIALECTS
-from respot.difference.findings import CodeChange, FileChange, Named, Noise, Place, RobotDifference
+from respot.difference.drift import Writes, covered, differing
+from respot.difference.findings import CodeChange, FileChange, Named, Noise, Place, RobotDifference, Shift
 from respot.difference.frames import FrameComparer, frame_masks, frames_in
 from respot.difference.index import Index
 from respot.difference.noise import layout, remarks, spelled_otherwise
@@ -63,6 +64,7 @@ class RobotComparison:
         self._old_index, self._new_index = Index(old.robot), Index(new.robot)
         self._comparer = Comparer(self._old_index, self._new_index, tolerance)
         self._frames = FrameComparer(self._old_index, self._new_index, tolerance)
+        self._writes = Writes(old.robot, self._dialect), Writes(new.robot, self._dialect)
         self._paths, self._removed, self._added = paths, removed, added
         self.found = RobotDifference(new.robot.name, new.robot.language)
 
@@ -150,11 +152,12 @@ class RobotComparison:
     def _programs(self, pairs: Sequence[FilePair]) -> None:
         for pair in pairs:
             pair.pair_names()
-        renames = Renames(pairs)
+        renames = Renames(pairs, self._old.robot, self._new.robot)
         self.found.renamed += renames.found
         for pair in pairs:
-            pair.old.rename(renames.names)
-            if renames.names:
+            names = renames.names_for(pair)
+            pair.old.rename(names)
+            if names:
                 pair.pair_names()
             pair.align_code()
         blocks = moved_blocks(pairs)
@@ -239,7 +242,7 @@ class RobotComparison:
             name = ", ".join(datum.name for datum in declared)
             self.found.noise.append(Noise(kind, pair.new.path, new.line, old.source, new.source, name=name))
             if kind == "drift":
-                self._drifted_frames(pair, old, new)
+                self._drifted_places(pair, old, new)
             return
         frames = frames_in(pair.old, old), frames_in(pair.new, new)
         common = [name for name in frames[1] if pair.old.names.get(name, name) in frames[0]]
@@ -255,29 +258,44 @@ class RobotComparison:
         ]
         self._verdict(pair, data.new, old, new, masked[0] == masked[1], rounded)
 
-    def _drifted_frames(self, pair: FilePair, old: Statement, new: Statement) -> None:
-        """Say that a tool or base differs, though it may be the program itself that changed it."""
+    def _drifted_places(self, pair: FilePair, old: Statement, new: Statement) -> None:
+        """Say that a tool, base or target differs, though it may be the program itself that changed it."""
         frames = frames_in(pair.old, old), frames_in(pair.new, new)
         for name in frames[0].keys() & frames[1].keys():
             change, _ = self._frames.changed((pair.old, old, frames[0][name]), (pair.new, new, frames[1][name]))
             if change is not None:
-                far = "" if change.shift is None else f" by {change.shift.distance:.3f} mm, {change.shift.turn:.4f} deg"
-                message = (
-                    f"{change.kind} {change.name} differs{far}, and the program writes it while it runs: whether "
-                    "someone edited it cannot be told; it is counted as noise"
-                )
-                self.found.issues.append(Issue("RUN_TIME_FRAME", message, pair.new.path, new.line))
+                self._doubt(f"{change.kind} {change.name}", change.shift, pair.new.path, new.line)
+        targets = [side.index.targets_in(side.path, item) for side, item in ((pair.old, old), (pair.new, new))]
+        for before, after in pair_targets(*targets):
+            if before is not None and after is not None:
+                moved, _ = self._comparer.target(before, after, same_text=False)
+                if moved is not None:
+                    self._doubt(f"target {moved.target}", moved.shift, pair.new.path, new.line)
+
+    def _doubt(self, what: str, shift: Shift | None, path: str, line: int) -> None:
+        far = "" if shift is None else f" by {shift.distance:.3f} mm, {shift.turn:.4f} deg"
+        message = (
+            f"{what} differs{far}, and the program writes it while it runs: whether someone edited it cannot be told; "
+            "it is counted as noise"
+        )
+        self.found.issues.append(Issue("RUN_TIME_FRAME", message, path, line))
 
     def _is_drift(self, pair: FilePair, old: Statement, new: Statement) -> bool:
-        """Whether a value was changed by the program itself: it may, the controller saves it, and nobody typed it."""
-        if not (self._dialect.persistent(old) and self._dialect.persistent(new)) or self._dialect.typed(new):
+        """Whether only values differ that the program itself writes and the controller saves, and nobody typed them."""
+        dialect = self._dialect
+        if not (dialect.persistent(old) and dialect.persistent(new)) or dialect.typed(new):
             return False
-        names = [datum.name for datum in pair.new.declared(new)]
-        writes: list[tuple[Callable[[str, str], bool], str]] = [
-            (self._old.robot.writes, pair.old.path),
-            (self._new.robot.writes, pair.new.path),
+        sides = [(pair.old, old, self._old.robot), (pair.new, new, self._new.robot)]
+        if not any(robot.writes(side.path, datum.name) for side, item, robot in sides for datum in side.declared(item)):
+            return False
+        leaves = differing(dialect, [(side.path, item, robot) for side, item, robot in sides])
+        parts = [
+            part
+            for (side, item, _), writes in zip(sides, self._writes, strict=True)
+            for datum in side.declared(item)
+            for part in writes.parts(side.path, datum.name)
         ]
-        return bool(names) and all(any(writes_in(path, name) for writes_in, path in writes) for name in names)
+        return bool(leaves) and all(covered(leaf, parts) for leaf in leaves or ())
 
     def _lone_datum(self, pair: FilePair, part: Part, statement: Statement, removed: bool) -> None:
         side, paths = pair.old if removed else pair.new, (pair.old.path, pair.new.path)
