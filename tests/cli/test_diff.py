@@ -123,6 +123,18 @@ def test_a_zip_against_the_folder_it_became(respot, tmp_path, backup):
     assert respot("diff", tmp_path / "b.zip", backup).code == 0
 
 
+def test_a_folder_more_or_less_moves_no_file(respot, tmp_path):
+    shutil.copytree(SAMPLES / "kuka" / "KRC", tmp_path / "old" / "KRC")
+    result = respot("diff", tmp_path / "old", tmp_path / "old" / "KRC", "--json")
+    assert (result.code, result.json["robots"][0]["files"]) == (0, [])
+    shutil.copytree(tmp_path / "old", tmp_path / "new")
+    program = tmp_path / "new" / "KRC" / "R1" / "Program"
+    (program / "below").mkdir()
+    (program / "rear_door_o.src").rename(program / "below" / "rear_door_o.src")
+    (robot,) = respot("diff", tmp_path / "old", tmp_path / "new", "--json").json["robots"]
+    assert [item["change"] for item in robot["files"]] == ["moved"]
+
+
 def test_a_converted_backup_differs_in_its_targets_alone(respot, tmp_path, backup, theory):
     assert respot("convert", backup, "--theory", theory, "-o", tmp_path / "out").code == 0
     (robot,) = respot("diff", backup, tmp_path / "out", "--json").json["robots"]

@@ -7,6 +7,7 @@ prints 467.13 as 467.130005.
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
@@ -20,6 +21,7 @@ Mask = tuple[Span, str]
 
 TARGET, NUMBER = "<target>", "<number>"
 _LARGEST_SINGLE = 3.4e38
+_WHOLE = re.compile(r"[+-]?\s*\d+")
 _NO_NAMES: Mapping[str, str] = {}
 
 
@@ -46,6 +48,13 @@ def spelled(text: str) -> str:
     return repr(single(value))
 
 
+def upper_case(word: str) -> str:
+    """Return a name in upper case; letters without one of their own, such as the sharp s, stay."""
+    if word.isascii():
+        return word.upper()
+    return "".join(upper if len(upper := letter.upper()) == 1 else letter for letter in word)
+
+
 def key(statement: Statement, masks: Iterable[Mask] = (), names: Mapping[str, str] = _NO_NAMES) -> Key:
     r"""Return what a statement says, token by token.
 
@@ -60,17 +69,24 @@ def key(statement: Statement, masks: Iterable[Mask] = (), names: Mapping[str, st
 
     Notes
     -----
-    RAPID's comma before ``\`` may be left out and says nothing (facts: rapid.md 1.4).
+    RAPID's comma before ``\`` may be left out and says nothing (facts: rapid.md 1.4). Where something is divided, 2 and
+    2.0 are told apart: KRL divides whole numbers without a rest. RAPID's ``dnum`` is held in double precision.
     """
     text = statement.text
     units = {span[0]: (span[1], mark) for span, mark in masks}
+    tokens = statement.tokens()
+    words = [text[start:end] for start, end in tokens]
+    divided, double = "/" in words, any(word.lower() == "dnum" for word in words[:4])
     if statement.shape.tree is not None:
         numbers = statement.numbers()
         for written, span in zip(numbers.texts, numbers.spans, strict=True):
-            units.setdefault(span[0], (span[1], spelled(written)))
+            said = repr(number(written)) if double else spelled(written)
+            if divided and not _WHOLE.fullmatch(written):
+                said += " REAL"
+            units.setdefault(span[0], (span[1], said))
     found: list[str] = []
     position = statement.start
-    for start, end in statement.tokens():
+    for (start, end), word in zip(tokens, words, strict=True):
         if start < position:
             continue
         unit = units.get(start)
@@ -78,13 +94,12 @@ def key(statement: Statement, masks: Iterable[Mask] = (), names: Mapping[str, st
             position = max(unit[0], end)
             found.append(unit[1])
             continue
-        word = text[start:end]
         if word[0] == '"':
             found.append(word)
             continue
         if word == "\\" and found and found[-1] == ",":
             found.pop()
-        upper = spelled(word) if word[0].isdigit() else word.upper()
+        upper = spelled(word) if word[0].isdigit() else upper_case(word)
         found.append(names.get(upper, upper))
     return tuple(found)
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from functools import cached_property
 
 from respot.difference.dialect import ANY, Dialect, Path, path_of
 from respot.program.robot import Robot
@@ -14,6 +15,7 @@ from respot.program.statement import Statement
 
 _STRING = re.compile(r'"[^"\r\n]*"')
 _WORD = re.compile(r"[^\W\d][\w$]*|\$\w+")
+_LAST_USED = re.compile(r"(?<![\w$])LAST_\w+", re.IGNORECASE)
 _CALLED = re.compile(r"([^\W\d][\w$]*)\s*\(")
 
 
@@ -61,6 +63,23 @@ class Writes:
             return found
         whole = self._dialect.precise or self._handed(bare)
         return [(bare,)] if whole else []
+
+    @cached_property
+    def last_used(self) -> frozenset[str]:
+        """Names like those of last used values, in upper case, that the code itself reads or writes."""
+        found: set[str] = set()
+        dialect = self._dialect
+        for file in self._robot.files.values():
+            if _LAST_USED.search(file.source.text) is None:
+                continue
+            head = ""
+            for statement in file.statements:
+                kind = statement.kind
+                head = kind if kind in dialect.heads else "" if kind in dialect.ends else head
+                if head not in dialect.data_heads and kind not in dialect.comments | dialect.folds:
+                    text = _STRING.sub('""', statement.source)
+                    found.update(word.upper() for word in _LAST_USED.findall(text))
+        return frozenset(found)
 
     def _read(self) -> None:
         """Note the left side of every assignment, unless it is a name of the routine's own."""

@@ -12,14 +12,16 @@ from respot.difference.findings import CodeChange, Noise, Place
 from respot.source import NEWLINE, SourceText
 
 _PARAMETERS = (".cfg",)
-#: Lines that a controller writes anew at every backup, by the name of the file.
+#: What a controller writes anew at every backup, by the name of the file.
 _STAMPS = {
-    "am.ini": re.compile(r"\s*(?:Date|ID|DiskNo|LastDisk|Name)\s*=", re.IGNORECASE),
-    "version.xml": re.compile(r".*<(?:Date|Time|CreationDate)\b", re.IGNORECASE),
-    "backinfo.txt": re.compile(r"\s*>>\s*(?:DATE|TIME)", re.IGNORECASE),
+    "am.ini": re.compile(r"^\s*(?:Date|ID|DiskNo|LastDisk|Name)\s*=.*", re.IGNORECASE),
+    "version.xml": re.compile(r"<(Date|Time|CreationDate)\b[^<>]*>[^<>]*</\1\s*>", re.IGNORECASE),
+    "backinfo.txt": re.compile(r"^\s*>>\s*(?:DATE|TIME).*", re.IGNORECASE),
 }
 _RECORD = "respot.json"
 _SECTION = re.compile(r"([A-Z][A-Z0-9_]*):\s*$")
+_QUOTED = re.compile(r'("[^"]*")')
+_BLANKS = re.compile(r"\s+")
 _NAME = re.compile(r'-name\s+"?([^"\s]+)"?', re.IGNORECASE)
 
 
@@ -81,7 +83,7 @@ class TextComparison:
         pairs = align([row[1] for row in old], [row[1] for row in new])
         for i0, i1, j0, j1 in gaps(pairs, len(old), len(new)):
             removed, added = old[i0:i1], new[j0:j1]
-            if stamp is not None and all(stamp.match(row[1]) for row in (*removed, *added)):
+            if stamp is not None and _without(stamp, removed) == _without(stamp, added):
                 line = added[0][0] if added else removed[0][0]
                 texts = [" ".join(row[1] for row in rows) for rows in (removed, added)]
                 self.noise.append(Noise("stamps", self._paths[1], line, texts[0], texts[1]))
@@ -121,14 +123,23 @@ class TextComparison:
         )
 
 
+def _without(stamp: re.Pattern[str], rows: Sequence[_Row]) -> list[str]:
+    """Return what lines say beside stamps."""
+    return [text for row in rows if (text := stamp.sub("", row[1]).strip())]
+
+
 #: Line, text, section and name of a line or of an instance.
 _Row = tuple[int, str, str, str]
 
 
 def _lines(text: str) -> list[_Row]:
-    return [
-        (number, " ".join(line.split()), "", "") for number, line in enumerate(NEWLINE.split(text), 1) if line.strip()
-    ]
+    return [(number, _bare(line), "", "") for number, line in enumerate(NEWLINE.split(text), 1) if line.strip()]
+
+
+def _bare(line: str) -> str:
+    """Return a line with single blanks outside of quotes."""
+    parts = _QUOTED.split(line.strip())
+    return "".join(part if index % 2 else _BLANKS.sub(" ", part) for index, part in enumerate(parts))
 
 
 def _instances(text: str) -> list[_Row]:
@@ -147,8 +158,8 @@ def _instances(text: str) -> list[_Row]:
         if head is not None:
             section = head[1]
         named = _NAME.search(begun)
-        text = " ".join(begun.split())
-        found.append((start, text, section, named[1] if named else text))
+        said = _bare(begun)
+        found.append((start, said, section, named[1] if named else said))
         begun, start = "", 0
     if begun:
         found.append((start, begun, section, ""))

@@ -1,0 +1,4 @@
+MODULE Weld
+PROC main()
+ENDPROC
+ENDMODULE

@@ -1,0 +1,5 @@
+MODULE Weld
+PROC main()
+Mass;
+ENDPROC
+ENDMODULE

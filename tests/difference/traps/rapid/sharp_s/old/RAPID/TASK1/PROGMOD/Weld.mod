@@ -1,0 +1,5 @@
+MODULE Weld
+PROC main()
+Maﬂ;
+ENDPROC
+ENDMODULE
