@@ -112,6 +112,37 @@ def test_the_record(respot):
     assert {"moved", "frames", "added", "removed", "renamed", "code", "noise"} <= set(robot)
 
 
+@pytest.mark.parametrize("width", [40, 60, 80, 120, 200])
+def test_no_number_is_cut_on_a_narrow_terminal(respot, monkeypatch, width):
+    """A target whose base alone moved is told by its way in the world: that column always stays."""
+    from respot.cli import display, show_diff
+
+    for module in (display, show_diff):
+        monkeypatch.setattr(module, "terminal_width", lambda: width)
+    monkeypatch.setattr(display, "is_terminal", lambda: True)
+    monkeypatch.setenv("COLUMNS", str(width))
+    out = respot("diff", *sides("krl/another_base_number")).out
+    assert "…" not in out
+    assert "714.143" in out
+    assert "BASE_DATA[1] -> BASE_DATA[2]" in " ".join(out.split())
+    assert ("too wide for this terminal" in out) == (width < 200)
+    assert all(len(text) <= width for text in out.partition("\ncode")[0].splitlines())
+
+
+def test_what_the_program_writes_is_said_to_be_doubtful(respot, tmp_path):
+    old, new = sides("krl/handed_to_a_routine_that_is_not_there")
+    respot("diff", old, new, "--html", tmp_path / "page.html")
+    for text in (respot("diff", old, new).out, (tmp_path / "page.html").read_text(encoding="utf-8")):
+        assert "nobody can tell whether someone edited them too" in text
+
+
+def test_a_target_that_the_program_writes_is_warned_of(respot):
+    result = respot("diff", *sides("rapid/part_that_the_program_does_not_write"), "--json")
+    (issue,) = [issue for issue in result.json["issues"] if issue["code"] == "RUN_TIME_FRAME"]
+    assert (issue["level"], issue["line"]) == ("warning", 14)
+    assert "target pB differs by 10.000 mm" in issue["message"]
+
+
 # pairing
 
 

@@ -43,6 +43,9 @@ def heading(text: str) -> None:
 def line(text: str = "") -> None:
     """Print a line; on a terminal it is wrapped, with its own indent and two more."""
     if is_terminal():
+        while text.startswith("\n"):  # wrapping would eat it
+            typer.echo()
+            text = text[1:]
         indent = " " * (len(text) - len(text.lstrip()) + 2)
         text = textwrap.fill(text, terminal_width(), subsequent_indent=indent, break_on_hyphens=False)
     typer.echo(printable(text))
@@ -75,6 +78,14 @@ def table(columns: Sequence[Column], rows: Sequence[Sequence[str]], marked: Sequ
         _rich(columns, rows, marked)
     else:
         _plain(columns, rows)
+
+
+def table_width(columns: Sequence[Column], rows: Sequence[Sequence[str]]) -> int:
+    """Columns of a terminal that a table takes if nothing is cut."""
+    widths = [
+        max(len(row[index]) for row in ([column.title for column in columns], *rows)) for index in range(len(columns))
+    ]
+    return sum(widths) + 3 * len(widths) - 1
 
 
 def _plain(columns: Sequence[Column], rows: Sequence[Sequence[str]]) -> None:

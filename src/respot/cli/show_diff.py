@@ -8,7 +8,7 @@ from typing import Any
 
 import typer
 
-from respot.cli.display import Column, line, table
+from respot.cli.display import Column, line, table, table_width, terminal_width
 from respot.cli.outcome import printable
 from respot.difference.findings import NOISE
 
@@ -87,10 +87,7 @@ class _Robot:
         if places:
             line("\nlargest shifts, mm and degrees: as programmed, and in the world (the part for an external TCP)")
             shown = places if self._look.everything else places[:_MOST_ROWS]
-            names = ("target", "program", "base")
-            numbers = ("dX", "dY", "dZ", "distance", "turn", "world dX", "dY", "dZ", "distance", "turn")
-            columns = [*(Column(name, number=False) for name in names), *map(Column, numbers), Column("", number=False)]
-            table(columns, [_moved_row(item) for item in shown])
+            _table_that_fits([_moved_row(item) for item in shown])
             _more(len(places) - len(shown), "shift")
         others = [item for item in rows if item["shift"] is None]
         if others:
@@ -135,7 +132,9 @@ class _Robot:
         if not counts:
             return
         told = ", ".join(f"{NOISE[kind]}: {count}" for kind, count in counts.items())
-        line(f"\nnoise, which changes nothing that the robot does: {told}" + ("" if self._look.noise else " (--noise)"))
+        line(f"\nnoise, counted apart: {told}" + ("" if self._look.noise else " (--noise)"))
+        if "drift" in counts:
+            line("of values that the program itself writes nobody can tell whether someone edited them too")
         if not self._look.noise:
             return
         for item in self._robot["noise"]:
@@ -145,6 +144,47 @@ class _Robot:
             for mark, text in (("-", item["old"]), ("+", item["new"])):
                 if text:
                     _echo(f"    {mark}{_one_line(text)}", self._look, _COLOURS[mark])
+
+
+_NAMES = ("target", "program", "base")
+_NUMBERS = ("dX", "dY", "dZ", "distance", "turn", "world dX", "dY", "dZ", "distance", "turn")
+_COLUMNS = (*(Column(name, number=False) for name in _NAMES), *map(Column, _NUMBERS), Column("", number=False))
+_PROGRAM, _BASE, _TURN, _NOTES = 1, 2, 7, len(_COLUMNS) - 1
+#: What a narrow terminal goes without, the least first: columns, and what these are called. How far a target moved in
+#: the world always stays: where a base moved it is all that there is.
+_LEAST = (
+    ((_NOTES,), ""),
+    ((8, 9, 10, 12), "dX, dY, dZ and turn in the world"),
+    ((_BASE,), "base"),
+    ((_TURN,), "turn"),
+    ((_PROGRAM,), "program"),
+    ((3, 4, 5), "dX, dY, dZ"),
+)
+
+
+def _table_that_fits(rows: Sequence[Sequence[str]]) -> None:
+    """Print shifts; no number is ever cut: columns that do not fit are left out, and that is said."""
+    kept = list(range(len(_COLUMNS)))
+    left: list[str] = []
+    for indices, name in _LEAST:
+        if table_width(*_part(rows, kept)) <= terminal_width():
+            break
+        kept = [index for index in kept if index not in indices]
+        left += [name] if name else []
+    table(*_part(rows, kept))
+    for row in rows:
+        notes = [row[_NOTES]] if _NOTES not in kept and row[_NOTES] else []
+        notes += [f"base {row[_BASE]}"] if _BASE not in kept and " -> " in row[_BASE] else []
+        notes += [f"turn {row[_TURN]}"] if _TURN not in kept and row[6] == "0.000" and float(row[_TURN]) else []
+        if notes:
+            line(f"  {row[0]} ({row[_PROGRAM]}): {', '.join(notes)}")
+    if left:
+        line(f"too wide for this terminal: {'; '.join(left)}; --json has them, and what is piped")
+
+
+def _part(rows: Sequence[Sequence[str]], kept: Sequence[int]) -> tuple[list[Column], list[list[str]]]:
+    titles = [_COLUMNS[index] if index != 11 or 8 in kept else Column("in world") for index in kept]
+    return titles, [[row[index] for index in kept] for row in rows]
 
 
 def _moved_row(item: Record) -> list[str]:

@@ -88,7 +88,7 @@ def compare(
             robots.append(_lone(before, after))
             continue
         robots.append(_robot(sides, (before, after), limits, done))
-    files, noise = ([], []) if robot_name is not None else _rest(sides, pairs)
+    files, noise = ([], []) if robot_name is not None else _rest(sides)
     known = {(issue.code, issue.message) for issue in _issues(sides[0])}
     fresh = [issue for issue in _issues(sides[1]) if (issue.code, issue.message) not in known]
     told = [issue for robot in robots for issue in robot.issues]
@@ -141,15 +141,12 @@ def _is_single(backup: Backup) -> bool:
     return backup.path.is_file() and backup.path.suffix.lower() != ".zip"
 
 
-def _rest(
-    sides: tuple[Backup, Backup], pairs: Sequence[tuple[Robot | None, Robot | None]]
-) -> tuple[list[FileChange], list[Noise]]:
+def _rest(sides: tuple[Backup, Backup]) -> tuple[list[FileChange], list[Noise]]:
     """Compare the files that belong to no robot."""
     left = []
     for backup in sides:
         owned = {path for robot in backup.robots for path in backup.files_of(robot)}
         left.append({path: data for path, data in backup.files.items() if path not in owned})
-    del pairs
     changes: list[FileChange] = []
     noise: list[Noise] = []
     old, new = left

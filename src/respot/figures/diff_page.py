@@ -55,10 +55,12 @@ def diff_page(
 
 def _robot(robot: Mapping[str, Any]) -> dict[str, Any]:
     moved = sorted(robot["moved"], key=_largest, reverse=True)
+    rows = [_moved(item) for item in moved[:_MOST_ROWS]]
     return {
         **robot,
         "counts": [(len(robot[name]), one if len(robot[name]) == 1 else many) for name, one, many in _WORDS],
-        "moved": [_moved(item) for item in moved[:_MOST_ROWS]],
+        "moved": rows,
+        "notes": any(row["said"] for row in rows),
         "moved_left": max(0, len(moved) - _MOST_ROWS),
         "frames": [{**item, "said": _frame(item)} for item in robot["frames"]],
         "code": [_code(item) for item in robot["code"][:_MOST_ROWS]],
