@@ -61,7 +61,7 @@ class Writes:
         ]  # fmt: skip
         if found:
             return found
-        whole = self._dialect.precise or self._handed(bare)
+        whole = self._dialect.precise or bare in self._handed
         return [(bare,)] if whole else []
 
     @cached_property
@@ -117,18 +117,21 @@ class Writes:
             for statement in file.statements
         )
 
-    def _handed(self, name: str) -> bool:
-        """Whether a routine is handed a datum that it writes; nobody knows that of one outside of the backup."""
+    @cached_property
+    def _handed(self) -> frozenset[str]:
+        """Names that stand where a routine is called that writes what it is handed.
+
+        Nobody knows that of a routine outside of the backup.
+        """
         writing = self._giving | self._dialect.writers
+        found: set[str] = set()
         for file in self._robot.files.values():
-            if name not in file.source.text.upper():
-                continue
-            for statement in file.statements:
+            for statement in file.statements if writing else ():
                 if "(" in statement.source and statement.kind not in self._dialect.comments:
                     text = _STRING.sub('""', statement.source).upper()
-                    if name in _words(text) and not writing.isdisjoint(_CALLED.findall(text)):
-                        return True
-        return False
+                    if not writing.isdisjoint(_CALLED.findall(text)):
+                        found |= _words(text)
+        return frozenset(found)
 
 
 def covered(leaf: Path, parts: Iterable[Path]) -> bool:

@@ -30,6 +30,7 @@ class Side:
     dialect: Dialect
     parts: dict[str, Part]
     _keys: dict[tuple[int, bool], Key] = field(default_factory=dict)
+    _declared: dict[int, Sequence[Datum]] = field(default_factory=dict)
     names: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
@@ -61,7 +62,10 @@ class Side:
         """Return what a declaration declares."""
         if statement.kind not in self.dialect.data or statement.shape.tree is None:
             return ()
-        return self.dialect.declared(self.path, statement)
+        found = self._declared.get(statement.start)
+        if found is None:
+            found = self._declared[statement.start] = self.dialect.declared(self.path, statement)
+        return found
 
 
 @dataclass(eq=False)

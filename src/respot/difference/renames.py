@@ -6,9 +6,11 @@ way. What the inline forms name after a point (FDAT, PDAT, LDAT) follows it.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from operator import attrgetter
 
 from respot.difference.canonical import Key, key
@@ -134,10 +136,12 @@ class Renames:
 
     def _by_place(self, left_old: _Left, left_new: _Left) -> None:
         """Take for one what is used in the same way and stands near: renamed and moved at once."""
-        for old in [lone for lone in left_old if lone.target is not None and lone.uses]:
-            near = [new for new in left_new if _near(old, new)]
-            if len(near) == 1 and sum(_near(other, near[0]) for other in left_old if other.target is not None) == 1:
-                self._take(old, near[0], left_old, left_new)
+        olds = [lone for lone in left_old if lone.target is not None and lone.uses]
+        near_old, near_new = _Near(olds), _Near(lone for lone in left_new if lone.target is not None and lone.uses)
+        for old in olds:
+            found = [new for new in near_new.of(old) if new in left_new]
+            if len(found) == 1 and sum(other in left_old for other in near_old.of(found[0])) == 1:
+                self._take(old, found[0], left_old, left_new)
 
     def _follow(self, old_name: str, new_name: str, left_old: _Left, left_new: _Left) -> None:
         dialect = self._files[0].old.dialect
@@ -207,6 +211,9 @@ class _Left:
     def __iter__(self) -> Iterator[_Lone]:
         return iter(list(self._by_id.values()))
 
+    def __contains__(self, lone: _Lone) -> bool:
+        return id(lone) in self._by_id
+
     def drop(self, lone: _Lone) -> None:
         self._by_id.pop(id(lone), None)
 
@@ -247,14 +254,35 @@ def _find_uses(lones: Sequence[_Lone], sides: Sequence[Side]) -> None:
                             lone.uses.append(use)
 
 
-def _near(old: _Lone, new: _Lone) -> bool:
-    before, after = old.target, new.target
-    if before is None or after is None or old.type != new.type or sorted(old.uses) != sorted(new.uses):
-        return False
-    if not before.components or not after.components:
-        return False
-    way = sum((a - b) ** 2 for a, b in zip(before.components[:3], after.components[:3], strict=True))
-    return bool(way**0.5 <= RENAMED_WITHIN_MM)
+class _Near:
+    """Points by what they are used for and where they stand, in cells as wide as what counts as near."""
+
+    def __init__(self, lones: Iterable[_Lone]) -> None:
+        self._cells: dict[tuple[object, ...], list[_Lone]] = {}
+        for lone in lones:
+            if lone.target is not None and lone.target.components:
+                self._cells.setdefault((_purpose(lone), *_cell(lone.target)), []).append(lone)
+
+    def of(self, lone: _Lone) -> list[_Lone]:
+        """Return the points near another one that are used in the same way."""
+        if lone.target is None or not lone.target.components:
+            return []
+        place, purpose = lone.target.components[:3], _purpose(lone)
+        around = product(*((index - 1, index, index + 1) for index in _cell(lone.target)))
+        return [
+            other
+            for cell in around
+            for other in self._cells.get((purpose, *cell), ())
+            if other.target is not None and math.dist(place, other.target.components[:3]) <= RENAMED_WITHIN_MM
+        ]
+
+
+def _purpose(lone: _Lone) -> tuple[object, ...]:
+    return lone.type, tuple(sorted(lone.uses))
+
+
+def _cell(target: Target) -> tuple[int, ...]:
+    return tuple(math.floor(max(-1e9, min(1e9, value)) / RENAMED_WITHIN_MM) for value in target.components[:3])
 
 
 def _written(lone: _Lone) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 
 from respot.difference.alignment import increasing
@@ -21,6 +22,9 @@ from respot.issues import Issue
 from respot.program.statement import Statement
 from respot.program.targets import Target
 from respot.source import NEWLINE
+
+#: A line end that some take for none; controllers write CR LF.
+_LONE_RETURN = re.compile(r"\r(?![\r\n])")
 
 
 class StatementComparison:
@@ -65,6 +69,7 @@ class StatementComparison:
             self.found.noise.append(Noise("order", pair.new.path))
         self._first_routine(pair)
         self._code_page(pair)
+        self._lone_returns(pair)
         if before == self._counts() and not pair.old.names:
             self.found.noise.append(Noise("blanks", pair.new.path))
 
@@ -104,6 +109,25 @@ class StatementComparison:
                 )
                 self.found.code.append(change)
                 return
+
+    def _lone_returns(self, pair: FilePair) -> None:
+        """Say that lines end that did not: of a return without a line feed nobody knows whether a controller obeys."""
+        sources = pair.old.file.source, pair.new.file.source
+        found = [
+            [] if source.newline == "\r" else [match.start() for match in _LONE_RETURN.finditer(source.text)]
+            for source in sources
+        ]  # fmt: skip
+        if len(found[0]) == len(found[1]):
+            return
+        lines, places = [], []
+        for source, starts in zip(sources, found, strict=True):
+            line = NEWLINE.split(source.text[: starts[0]])[-1] if starts else ""
+            lines.append([f"{len(starts)} returns without a line feed: {line}".rstrip(" :")])
+            places.append(Place(source.path, len(NEWLINE.split(source.text[: starts[0]])) if starts else 1))
+        change = CodeChange(
+            pair.new.path, pair.old.path, "encoding", "", lines[0], lines[1], places[0], places[1], ("encoding",)
+        )
+        self.found.code.append(change)
 
     def _counts(self) -> tuple[int, ...]:
         found = self.found
