@@ -287,6 +287,15 @@ def test_the_page_stands_alone_and_escapes(respot, tmp_path):
     assert respot("diff", old, new, "--html", tmp_path / "old" / "page.html").code == 2
 
 
+def test_the_page_may_lie_beside_the_program_but_not_on_its_data_list(respot, tmp_path):
+    folder = sides("krl/point_renamed")[0] / "KRC/R1/Program"
+    for suffix in ("src", "dat"):
+        shutil.copy(folder / f"weld.{suffix}", tmp_path / f"weld.{suffix}")
+    arguments = ("diff", tmp_path / "weld.src", tmp_path / "weld.src", "--html")
+    assert respot(*arguments, tmp_path / "weld.html").code == 0
+    assert respot(*arguments, tmp_path / "weld.dat", "--force").code == 2
+
+
 @pytest.mark.parametrize(
     "trap", ["krl/only_the_base_moved", "rapid/persistent_values", "krl/point_renamed", "krl/block_moved"]
 )

@@ -106,7 +106,10 @@ class Dialect:
     typed : callable
         Whether the spelling of a datum's value shows that a person wrote it, not the controller.
     values : callable
-        Every value that a declaration gives, by the part of the datum that it is the value of.
+        Every value that a declaration gives, by the part of the datum that it is the value of:
+        ``values(path, statement, records)``.
+    records : callable
+        Type and name of the fields of each record that a robot's programs declare.
     local_data, writing : frozenset of str
         Kinds of statements that declare a name in a routine, and of those that give a datum a value.
     left : re.Pattern
@@ -134,7 +137,8 @@ class Dialect:
     companions: Callable[[str], Sequence[str]]
     persistent: Callable[[Statement], bool]
     typed: Callable[[Statement], bool]
-    values: Callable[[str, Statement, Robot], Mapping[Path, str]]
+    values: Callable[[str, Statement, Mapping[str, Sequence[tuple[str, str]]]], Mapping[Path, str]]
+    records: Callable[[Robot], Mapping[str, Sequence[tuple[str, str]]]]
     local_data: frozenset[str]
     writing: frozenset[str]
     left: re.Pattern[str]

@@ -6,7 +6,7 @@ What differs in another part, in the type or in the size of a datum was changed 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 
 from respot.difference.dialect import ANY, Dialect, Path, path_of
@@ -34,6 +34,7 @@ class Writes:
         self._robot = robot
         self._dialect = dialect
         self._seen: dict[str, list[tuple[str, Path]]] | None = None
+        self._declaring: dict[tuple[str, str], bool] = {}
         #: routines that write a parameter of theirs
         self._giving: set[str] = set()
 
@@ -63,6 +64,11 @@ class Writes:
             return found
         whole = self._dialect.precise or bare in self._handed
         return [(bare,)] if whole else []
+
+    @cached_property
+    def records(self) -> Mapping[str, Sequence[tuple[str, str]]]:
+        """Type and name of the fields of each record that the programs declare."""
+        return self._dialect.records(self._robot)
 
     @cached_property
     def last_used(self) -> frozenset[str]:
@@ -109,6 +115,12 @@ class Writes:
 
     def _declares(self, program: str, name: str) -> bool:
         """Whether a program has a datum of its own of this name."""
+        known = self._declaring.get((program, name))
+        if known is None:
+            known = self._declaring[program, name] = self._has(program, name)
+        return known
+
+    def _has(self, program: str, name: str) -> bool:
         word = re.compile(rf"(?<![\w$]){re.escape(name)}(?![\w$])", re.IGNORECASE)
         return any(
             statement.kind in self._dialect.local_data and word.search(statement.source) is not None
@@ -141,14 +153,14 @@ def covered(leaf: Path, parts: Iterable[Path]) -> bool:
     )
 
 
-def differing(dialect: Dialect, sides: Sequence[tuple[str, Statement, Robot]]) -> list[Path] | None:
+def differing(dialect: Dialect, sides: Sequence[tuple[str, Statement, Writes]]) -> list[Path] | None:
     """Return which values of two declarations differ; None where more than values does, such as a type or a size."""
     heads, leaves = [], []
-    for path, statement, robot in sides:
+    for path, statement, writes in sides:
         tokens = [statement.text[start:end] for start, end in statement.tokens()]
         at = next((index for index, token in enumerate(tokens) if token in ("=", ":=")), None)
         heads.append(None if at is None else [token.upper() for token in tokens[:at]])
-        leaves.append(dialect.values(path, statement, robot))
+        leaves.append(dialect.values(path, statement, writes.records))
     if heads[0] is None or heads[0] != heads[1] or leaves[0].keys() != leaves[1].keys():
         return None
     return [leaf for leaf, value in leaves[0].items() if value != leaves[1][leaf]]

@@ -10,7 +10,6 @@ from respot.geometry import pose, rotation_from_abc
 from respot.languages.krl.forms import FORMS
 from respot.languages.krl.symbols import Aggregate, Symbol, read_symbols
 from respot.languages.krl.syntax import COMMENT, END_FOLD, FOLD
-from respot.program.robot import Robot
 from respot.program.statement import OPAQUE, Statement
 from respot.program.targets import Number
 
@@ -90,8 +89,8 @@ def _flat(value: Aggregate, prefix: str) -> Iterator[tuple[str, float | str]]:
             yield prefix + name, float(member.value) if isinstance(member, Number) else member
 
 
-def _values(path: str, statement: Statement, robot: Robot) -> Mapping[Path, str]:
-    del robot
+def _values(path: str, statement: Statement, records: Mapping[str, object]) -> Mapping[Path, str]:
+    del records  # members have their names in the value
     found: dict[Path, str] = {}
     for symbol in _symbols(path, statement):
         start = path_of(symbol.name)
@@ -203,6 +202,7 @@ KRL = Dialect(
     persistent=lambda _: True,  # a data list is the controller's own memory
     typed=lambda _: False,
     values=_values,
+    records=lambda _: {},
     local_data=frozenset(("declaration",)),
     writing=frozenset(("assignments", "trigger", "interrupt_declaration", "for_", OPAQUE)),
     left=_LEFT_SIDE,

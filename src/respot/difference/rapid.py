@@ -10,7 +10,7 @@ from respot.difference.dialect import Datum, Dialect, FrameValue, Path, ranked
 from respot.languages.rapid.calls import read_lines
 from respot.languages.rapid.forms import FORMS, InstructionForm, instruction_form
 from respot.languages.rapid.machine import read_tool, read_work_object
-from respot.languages.rapid.records import BUILT_IN
+from respot.languages.rapid.records import BUILT_IN, Fields
 from respot.languages.rapid.symbols import Aggregate, Symbol, Value, data_symbol
 from respot.languages.rapid.syntax import AFTER_MODULE, COMMENT
 from respot.program.robot import Robot
@@ -111,7 +111,7 @@ def _flat(value: Value, kind: str, prefix: str) -> Iterator[tuple[str, float | s
         yield prefix.rstrip("."), float(value.value) if isinstance(value, Number) else str(value).upper()
 
 
-def _values(path: str, statement: Statement, robot: Robot) -> Mapping[Path, str]:
+def _values(path: str, statement: Statement, records: Mapping[str, Sequence[tuple[str, str]]]) -> Mapping[Path, str]:
     symbol = _symbol(path, statement)
     if symbol is None or symbol.value is None:
         return {}
@@ -124,7 +124,7 @@ def _values(path: str, statement: Statement, robot: Robot) -> Mapping[Path, str]
         if not isinstance(value, Aggregate):
             found[place] = str(float(value.value)) if isinstance(value, Number) else str(value)
             continue
-        known = () if dimensions else BUILT_IN.get(kind) or _record(robot, kind)
+        known = () if dimensions else BUILT_IN.get(kind) or records.get(kind, ())
         for index, item in enumerate(value.items):
             inner, name = known[index] if len(known) == len(value.items) else (kind if dimensions else "", "")
             step = name.upper() or (str(index + 1) if dimensions else f"#{index + 1}")
@@ -132,22 +132,22 @@ def _values(path: str, statement: Statement, robot: Robot) -> Mapping[Path, str]
     return found
 
 
-def _record(robot: Robot, kind: str) -> Sequence[tuple[str, str]]:
-    """Return type and name of each field of a record that a module of the robot declares."""
-    word = re.compile(rf"\bRECORD\s+{re.escape(kind)}\b", re.IGNORECASE)
+def _records(robot: Robot) -> Mapping[str, Fields]:
+    """Return type and name of each field of the records that the modules of a robot declare, by name in lower case."""
+    found: dict[str, Fields] = {}
     for file in robot.files.values():
-        if kind and word.search(file.source.text) is not None:
-            inside = False
-            fields: list[tuple[str, str]] = []
-            for statement in file.statements:
-                if statement.kind == "record":
-                    inside = _name_of(statement).lower() == kind
-                elif statement.kind == "end_record" and inside:
-                    return fields
-                elif inside and statement.kind != COMMENT:
-                    tokens = plain_tokens(statement)
-                    fields.append((tokens[0].lower(), tokens[1] if len(tokens) > 1 else ""))
-    return ()
+        if "RECORD" not in file.source.text.upper():
+            continue
+        name, fields = "", list[tuple[str, str]]()
+        for statement in file.statements:
+            if statement.kind == "record":
+                name, fields = _name_of(statement).lower(), []
+            elif statement.kind == "end_record":
+                found[name], name = tuple(fields), ""
+            elif name and statement.kind != COMMENT:
+                tokens = plain_tokens(statement)
+                fields.append((tokens[0].lower(), tokens[1] if len(tokens) > 1 else ""))
+    return found
 
 
 def _noise(statement: Statement, declared: Sequence[Datum]) -> str:
@@ -259,6 +259,7 @@ RAPID = Dialect(
     persistent=_persistent,
     typed=_typed,
     values=_values,
+    records=_records,
     local_data=frozenset(("data",)),
     writing=frozenset(("assignment", "compact_if", "call", OPAQUE)),
     left=_LEFT_SIDE,

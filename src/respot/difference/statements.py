@@ -41,7 +41,6 @@ class StatementComparison:
     """
 
     def __init__(self, old: Index, new: Index, tolerance: Tolerance, found: RobotDifference) -> None:
-        self._old, self._new = old.robot, new.robot
         self._dialect = DIALECTS[new.robot.language]
         self._comparer = Comparer(old, new, tolerance)
         self._frames = FrameComparer(old, new, tolerance)
@@ -251,16 +250,14 @@ class StatementComparison:
         dialect = self._dialect
         if not (dialect.persistent(old) and dialect.persistent(new)) or dialect.typed(new):
             return False
-        sides = [(pair.old, old, self._old), (pair.new, new, self._new)]
-        if not any(robot.writes(side.path, datum.name) for side, item, robot in sides for datum in side.declared(item)):
-            return False
-        leaves = differing(dialect, [(side.path, item, robot) for side, item, robot in sides])
+        sides = [(pair.old, old, self._writes[0]), (pair.new, new, self._writes[1])]
         parts = [
             part
-            for (side, item, _), writes in zip(sides, self._writes, strict=True)
+            for side, item, writes in sides
             for datum in side.declared(item)
             for part in writes.parts(side.path, datum.name)
         ]
+        leaves = differing(dialect, [(side.path, item, writes) for side, item, writes in sides]) if parts else None
         return bool(leaves) and all(covered(leaf, parts) for leaf in leaves or ())
 
     def _lone_datum(self, pair: FilePair, part: Part, statement: Statement, removed: bool) -> None:
