@@ -146,6 +146,13 @@ CODES: dict[str, tuple[Level, str]] = {
     "EXTRAPOLATED": (_W, "a target or spot lies outside the hull of the fitted spots"),
     "SHARED_TARGET": (_E, "a target is used under several bases or by a refused program"),
     "ALREADY_APPLIED": (_E, "this calibration was applied to this source before"),
+    "EFFECT_WRITTEN": (_W, "an effect is made good by the points: nobody may put it right elsewhere as well"),
+    "EFFECT_NOT_WRITTEN": (_W, "an effect that comes and goes is not written into points"),
+    "EFFECT_NOT_KNOWN": (_E, "what an effect follows is not known at a target: the target cannot be corrected"),
+    "EFFECTS_TOO_LARGE": (_E, "the pose that lands a target where it should is not found"),
+    "NO_KINEMATICS": (_E, "effects of the arm are to be written, and no kinematic model of the robot is known"),
+    "WRONG_FRAME": (_E, "spots lie under another frame than is written: the program is wrong, not its points"),
+    "RIGID_PART_KEPT": (_I, "a rigid motion of all points under a base is left out: the registration swallows it"),
     "NOT_CHECKED": (_I, "what respot does not check"),
     "VERIFY_FAILED": (_E, "what was written is not what was intended"),
 }

@@ -69,8 +69,14 @@ def test_a_table_with_joints_and_a_robot(respot, practice, tmp_path):
     assert kept.json["kept"] is True
     refused = respot("convert", practice / "backup", "-c", "cal.json", "-o", "out")
     assert refused.code == 2
-    assert "effects" in refused.err
+    assert "ANOTHER_SOURCE" in refused.err  # it was fitted to the list of the same spots, not to the backup
     assert not (tmp_path / "out").exists()
+    written = respot("convert", practice / "backup", "-c", "cal.json", "-o", "out", "--force", "--json")
+    assert written.code == 0
+    assert written.json["direction"] == "compensate"
+    assert written.json["effects_written"] == ["joint_zero axis 3"]
+    assert written.json["effects_not_written"] == ["tip_wear column welds_since_cap"]
+    assert {"EFFECT_WRITTEN", "EFFECT_NOT_WRITTEN"} <= set(codes(written))
 
 
 def test_json_says_what_was_tried_hidden_and_left(respot, practice):

@@ -35,7 +35,32 @@ def run(
     tau: options.Tau = None,
     n_min: options.NMin = None,
     match: options.Match = "auto",
-    effects: options.EffectsOption = "swapped_ids",
+    effects: Annotated[
+        str | None,
+        typer.Option(
+            "--effects",
+            help="What to look for beside the rigid part: auto, none, or names with commas, such as "
+            "swapped_ids,joint_zero. Without it swapped_ids for --theory, auto for --measured.",
+            show_default=False,
+        ),
+    ] = None,
+    inverse: Annotated[
+        bool,
+        typer.Option(
+            "--inverse",
+            help="The other way round: simulation programs to the floor with a theory calibration; with a measured one "
+            "a compensation is undone.",
+        ),
+    ] = False,
+    bases: Annotated[
+        str,
+        typer.Option(
+            "--bases",
+            help="kept or remeasured. A tracker that stands anywhere cannot tell a rigid motion of all points under a "
+            "base from its own place, so that motion is not written into points (kept); where bases are measured anew "
+            "by the tracker it is (remeasured).",
+        ),
+    ] = "kept",
     frame: options.FrameOption = None,
     robot_name: options.RobotName = None,
     robot: options.RobotModel = None,
@@ -45,7 +70,24 @@ def run(
     programs: Annotated[
         str | None, typer.Option("--programs", help="Glob of the programs in scope.", show_default=False)
     ] = None,
-    max_shift: Annotated[str, typer.Option("--max-shift", help="No target moves further: MM[,DEG].")] = "150,5",
+    max_shift: Annotated[
+        str | None,
+        typer.Option(
+            "--max-shift",
+            help="No target moves further: MM[,DEG]. Without it 150,5 for theory and 10,1 for measured.",
+            show_default=False,
+        ),
+    ] = None,
+    max_residual: Annotated[
+        float,
+        typer.Option("--max-residual", min=0.0, help="No target leaves the rigid motion of its path further, mm."),
+    ] = 15.0,
+    covariates: Annotated[
+        Path | None,
+        typer.Option(
+            "--covariates", help="Table of columns that effects follow, joined by id; with -c.", show_default=False
+        ),
+    ] = None,
     keep_config: Annotated[
         bool, typer.Option("--keep-config", help="Keep status/turn and confdata that cannot be computed.")
     ] = False,
@@ -58,7 +100,14 @@ def run(
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Do everything but write.")] = False,
     tolerance: options.Tolerance = 10.0,
     seed: options.Seed = 0,
-    force: options.Force = False,
+    force: Annotated[
+        bool,
+        typer.Option(
+            "--force",
+            help="Replace an output folder that is not empty; use a calibration of another robot, or of another state "
+            "of the backup.",
+        ),
+    ] = False,
     as_json: options.AsJson = False,
     strict: options.Strict = False,
 ) -> None:
@@ -74,19 +123,33 @@ def run(
                 "may be corrected by them; use --method robust, or fit --method affine to look at them"
             )
             raise BadInputError("BAD_OPTION", message)
-        looked_for = effects_named(effects)
-        if "tool_offset" in looked_for or looked_for == "auto":
+        if bases not in ("kept", "remeasured"):
+            raise BadInputError("BAD_OPTION", f"--bases is kept or remeasured, not {bases}")
+        looked_for = effects_named(effects or ("auto" if measured else "swapped_ids"))
+        if not measured and ("tool_offset" in looked_for or looked_for == "auto"):
             message = (
                 "programs are not corrected by a tool offset: it would have to go into the tool as well, or the tool "
                 "be corrected twice; look for it with fit, correct the TCP, and convert with --effects swapped_ids"
             )
             raise BadInputError("BAD_OPTION", message)
         model = None if robot is None else robot_of(robot)
-        chosen = CorrectionOptions(programs, shift_limits(max_shift), keep_config, partial, templates, model)
+        chosen = CorrectionOptions(
+            programs,
+            None if max_shift is None else shift_limits(max_shift),
+            keep_config,
+            partial,
+            templates,
+            model,
+            inverse,
+            "kept" if bases == "kept" else "remeasured",
+            max_residual,
+            force,
+            covariates,
+        )
         if calibration is not None:
             if theory or measured:
                 raise BadInputError("BAD_OPTION", "give either -c CAL.json or a reference to fit to, not both")
-            if (method, tau, n_min, match, effects) != ("robust", None, None, "auto", "swapped_ids"):
+            if (method, tau, n_min, match, effects) != ("robust", None, None, "auto", None):
                 message = (
                     "--method, --tau, --n-min, --match and --effects belong to a fit; the calibration of -c is fitted "
                     "already"
@@ -99,6 +162,8 @@ def run(
             reference, fit_options = reference_of(
                 theory, measured, frame, robot_name, spot_id, noise, seed, method, tau, n_min, match
             )
+            if measured:
+                fit_options = replace(fit_options, robot=model)
         fit_options = replace(fit_options, profiles=tuple(profile or ()), effects=looked_for)
         return convert_to(source, reference, calibration, fit_options, chosen, output, dry_run, force, tolerance)
 
@@ -124,7 +189,9 @@ def convert_to(
     if output is None and not dry_run:
         raise BadInputError("BAD_OPTION", "give the new folder with -o OUTDIR, or --dry-run")
     if output is not None:
-        check_output(output, force, [path for path in (source, reference, calibration) if path is not None])
+        check_output(
+            output, force, [path for path in (source, reference, calibration, chosen.covariates) if path is not None]
+        )
     conversion = convert(source, reference, calibration, fit_options, chosen)
     if dry_run or output is None:
         rehearse(conversion.files, conversion.correction)
@@ -141,7 +208,7 @@ def convert_to(
     )
 
 
-def shift_limits(text: str) -> tuple[float, float]:
+def shift_limits(text: str) -> tuple[float, float | None]:
     """Read ``MM[,DEG]``.
 
     Raises
@@ -149,12 +216,10 @@ def shift_limits(text: str) -> tuple[float, float]:
     BadInputError
         The text is not one or two positive numbers.
     """
-    from respot.correction.options import ALIGN_MAX_SHIFT
-
     try:
         numbers = [float(part) for part in text.split(",")]
     except ValueError:
         numbers = []
     if len(numbers) not in (1, 2) or not all(0.0 <= number < float("inf") for number in numbers):
         raise BadInputError("BAD_OPTION", f"--max-shift is MM or MM,DEG, not {text!r}")
-    return numbers[0], numbers[1] if len(numbers) == 2 else ALIGN_MAX_SHIFT[1]
+    return numbers[0], numbers[1] if len(numbers) == 2 else None

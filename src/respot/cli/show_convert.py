@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from respot.calibration.report import report
 from respot.cli.display import Column, heading, line, table
@@ -31,9 +31,28 @@ def show_conversion(conversion: Conversion, tolerance: float, written: Path | No
         line(f"  REFUSED, left as it was: program {program}")
     line("  status/turn and confdata: " + ("recomputed" if correction.reconfigured else "kept, NOT checked"))
     line("  read back and compared with what was intended: equal; every other byte is as it was")
-    line("  for the cell as simulated: the real old cell must never load these files")
+    if correction.direction == "align":
+        line("  for the cell as simulated: the real old cell must never load these files")
+    else:
+        line("  for the real cell: the simulation must not load these files")
+    _show_effects(conversion.image.record())
     if written is not None:
         line(f"  in {written} (record: {written / 'respot.json'})")
+
+
+def _show_effects(record: Mapping[str, Any]) -> None:
+    """What became of each effect, and what was left to the registration."""
+    for key, words in (
+        ("effects_written", "written into the points: leave the cause as it is"),
+        ("effects_not_written", "NOT written into the points: for a person to put right"),
+    ):
+        if record.get(key):
+            line(f"  {words}: {', '.join(record[key])}")
+    for each in record.get("left_to_registration", ()):
+        line(
+            f"  {each['base']}: of its {each['spots']} spots a rigid motion of {each['shift_mm']:.3f} mm and "
+            f"{each['turn_deg']:.4f} degrees is left to the registration (--bases remeasured writes it)"
+        )
 
 
 def _show_moved(conversion: Conversion) -> None:

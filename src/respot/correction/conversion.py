@@ -15,7 +15,8 @@ from respot.calibration.report import report
 from respot.calibration.source_fit import FitOptions, SourceFit, fit_source
 from respot.calibration.stored import load_calibration, source_issues
 from respot.correction.correction import Correction, correct
-from respot.correction.image import RigidImage
+from respot.correction.image import Image
+from respot.correction.images import image_of, mark_of
 from respot.correction.options import CorrectionOptions
 from respot.issues import BadInputError, Issue
 from respot.languages import LANGUAGES
@@ -39,6 +40,8 @@ class Conversion:
         The model.
     fitted : SourceFit or None
         The fit it comes from; None where it was loaded.
+    image : Image
+        What became of each target.
     correction : Correction
         Edits, refusals, changed files.
     issues : sequence of Issue
@@ -48,6 +51,7 @@ class Conversion:
     source: Source
     calibration: Calibration
     fitted: SourceFit | None
+    image: Image
     correction: Correction
     issues: Sequence[Issue]
 
@@ -70,6 +74,7 @@ class Conversion:
             "direction": correction.direction,
             "robot": {"name": self.robot.name, "language": self.robot.language, "model": self.robot.machine.model},
             "calibration": {"hash": self.calibration.content_hash, "kind": self.calibration.kind},
+            **self.image.record(),
             "edits": [
                 {
                     "path": edit.path,
@@ -135,60 +140,65 @@ def convert(
         assert calibration is not None  # noqa: S101 - the command line asks for one of both
         fitted, model = None, load_calibration(calibration)
         read = read_source(source, model.ids, fit_options.spot_id, fit_options.robot_name, fit_options.profiles)
-        issues, ids = [*read.issues, *source_issues(model, read, option="")], model.ids
+        issues, ids = (
+            [*read.issues, *source_issues(model, read, any_robot=options.any_source, option="--force")],
+            model.ids,
+        )
     if read.robot is None:
         raise BadInputError("NO_ROBOT", "is a table: only a backup or a program can be converted", str(source))
-    if model.tool_offset is not None:
-        message = (
-            "the calibration has a tool offset: moving points by its rigid part alone would leave every spot off by "
-            "the offset, and whether the tool or the points are to be corrected is for you to say: correct the TCP, "
-            "fit again and convert, or fit with --effects swapped_ids"
-        )
-        raise BadInputError("BAD_OPTION", message, str(calibration or reference))
-    if model.terms:
-        names = ", ".join(term.label for term in model.terms)
-        message = (
-            f"the calibration has effects ({names}), which move each spot by itself: correcting programs by them is "
-            "not built yet; remove the cause and fit again, or fit with --effects swapped_ids"
-        )
-        raise BadInputError("BAD_OPTION", message, str(calibration or reference))
-    if model.kind != "theory":
-        message = (
-            "a measured reference without effects registers two coordinate systems and has nothing to compensate; "
-            "to move programs onto another list of spots, give it with --theory"
-        )
-        raise BadInputError("BAD_OPTION", message)
-    _refuse_recorded(read, _mark(model, read.robot))
+    image = image_of(model, fitted, read, options, str(calibration or reference))
+    mark = mark_of(model, inverse=options.inverse)
+    _refuse_recorded(read, _mark(mark, read.robot))
+    if fitted is not None and model.kind == "measured":
+        _refuse_old_measurement(read, fitted.reference)
     moves = _moves_of(read, ids)
     if not moves:
         detail = f": {read.spots.issues[0]}" if read.spots.issues else ""
         message = f"holds none of the spots that the calibration was fitted to{detail}"
         raise BadInputError("NO_COMMON_IDS", message, str(source))
     language = LANGUAGES[read.robot.language].with_plant(read.backup.profiles if read.backup is not None else ())
-    image = RigidImage(model.source2reference)
-    correction = correct(read.robot, language, image, model.kind, model.content_hash, moves, options)
+    correction = correct(read.robot, language, image, model.kind, mark, moves, options)
     refused = [
         Issue(refusal.code, f"{refusal.target}: {refusal.message}", refusal.path, refusal.line)
         for refusal in correction.refused
     ]
-    return Conversion(read, model, fitted, correction, [*issues, *refused, *correction.issues])
+    return Conversion(read, model, fitted, image, correction, [*issues, *refused, *correction.issues])
 
 
-def _applied(source: Source) -> list[str]:
-    """Hashes of the calibrations that the backup's own record says were applied to it."""
+def _recorded(source: Source, key: str) -> list[str]:
+    """Texts of a list of the backup's own record, which earlier conversions wrote."""
     data = source.backup.files.get(RECORD) if source.backup is not None else None
     if data is None:
         return []
     try:
-        applied = json.loads(data).get("applied", [])
+        found = json.loads(data).get(key, [])
     except (ValueError, AttributeError):
         return []
-    return [item for item in applied if isinstance(item, str)] if isinstance(applied, list) else []
+    return [item for item in found if isinstance(item, str)] if isinstance(found, list) else []
 
 
-def _mark(calibration: Calibration, robot: Robot) -> str:
+def _applied(source: Source) -> list[str]:
+    """Hashes of the calibrations that the backup's own record says were applied to it."""
+    return _recorded(source, "applied")
+
+
+def _measured(source: Source) -> list[str]:
+    """Hashes of the measurements that the backup's programs were compensated by."""
+    return _recorded(source, "measurements")
+
+
+def _refuse_old_measurement(source: Source, reference: Source) -> None:
+    if reference.sha256 in _measured(source):
+        message = (
+            "these programs were compensated by this very measurement, which is of the programs before: what it shows "
+            "is in the points already. Measure the compensated programs, or start from the original"
+        )
+        raise BadInputError("ALREADY_APPLIED", message, str(source.path / RECORD))
+
+
+def _mark(mark: str, robot: Robot) -> str:
     """Return what the record says of a calibration that was applied; of several robots of one controller, to which."""
-    return f"{calibration.content_hash} {robot.task}".rstrip()
+    return f"{mark} {robot.task}".rstrip()
 
 
 def _refuse_recorded(source: Source, mark: str) -> None:
@@ -205,13 +215,17 @@ def _moves_of(source: Source, ids: Sequence[str]) -> list[Move]:
 def record_of(conversion: Conversion) -> dict[str, Any]:
     """What ``respot.json`` holds: what was applied to what, so that a reader can check and never apply it twice."""
     correction, files = conversion.correction, conversion.files
+    model = conversion.calibration
+    own = model.provenance.get("reference_sha256") if model.kind == "measured" else None
+    measurements = [*_measured(conversion.source), *([own] if isinstance(own, str) else [])]
     return {
         "schema": "respot.convert/1",
         "version": __version__,
         "source": str(conversion.source.path),
         "source_sha256": conversion.source.sha256,
         "verified": True,
-        "applied": [*_applied(conversion.source), _mark(conversion.calibration, correction.robot)],
+        "applied": [*_applied(conversion.source), _mark(correction.calibration_hash, correction.robot)],
+        **({"measurements": measurements} if measurements else {}),
         "issues": [issue.as_json() for issue in conversion.issues],
         "contents": {path: _sha256(correction.files.get(path, data)) for path, data in files.items()},
         "files": {

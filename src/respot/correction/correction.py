@@ -140,7 +140,7 @@ def correct(
     unseen = image.see(scope)
     after = {id(moving): image.pose(moving) for moving in scope.moving}
     moving = [item for item in scope.moving if _moves(item, after[id(item)])]
-    refused = [*scope.refusals, *unseen, *_too_far(moving, after, options)]
+    refused = [*scope.refusals, *unseen, *_too_far(moving, after, options.furthest(kind))]
     cell = cell_of(robot.machine, robot.language, options.robot)
     printed = {id(item): _printed(robot, language, item, after[id(item)]) for item in moving}
     configured = _configure(cell, moving, printed, language, options, refused)
@@ -216,9 +216,9 @@ def _moves(moving: Moving, after: RigidTransform) -> bool:
 
 
 def _too_far(
-    moving: Sequence[Moving], after: Mapping[int, RigidTransform], options: CorrectionOptions
+    moving: Sequence[Moving], after: Mapping[int, RigidTransform], limits: tuple[float, float]
 ) -> list[Refusal]:
-    furthest, widest = options.max_shift
+    furthest, widest = limits
     found = []
     for item in moving:
         assert item.target.pose is not None  # noqa: S101

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from respot.kinematics.model import RobotModel
 
-#: `--max-shift` of align, mm and degrees (DESIGN section 10).
-ALIGN_MAX_SHIFT = (150.0, 5.0)
+#: `--max-shift`, mm and degrees (DESIGN section 10): of a theory calibration, and of a measured one. The way back of
+#: either is as long as the way there.
+THEORY_MAX_SHIFT, MEASURED_MAX_SHIFT = (150.0, 5.0), (10.0, 1.0)
+#: `--max-residual` [mm].
+MAX_RESIDUAL = 15.0
 
 
 @dataclass(frozen=True)
@@ -19,8 +23,8 @@ class CorrectionOptions:
     ----------
     programs : str, optional
         Glob of program names that are in scope, in place of what the matched spots say.
-    max_shift : (float, float)
-        A target moves no further than this, mm and degrees.
+    max_shift : (float, float or None), optional
+        A target moves no further than this, mm and degrees; by default as far as is usual for the calibration's kind.
     keep_config : bool
         Keep status/turn and confdata of moved targets where they cannot be computed.
     partial : bool
@@ -29,11 +33,33 @@ class CorrectionOptions:
         A plant's own templates.
     robot : RobotModel, optional
         Kinematic model in place of the machine data's.
+    inverse : bool
+        The other way round.
+    bases : str
+        ``kept`` or ``remeasured``: whether a rigid motion of all points under a base is left out of them.
+    max_residual : float
+        No target departs from the rigid motion of its path by more [mm].
+    any_source : bool
+        Use a calibration on another robot or another state of the backup than it was fitted to.
+    covariates : Path, optional
+        Table of columns that effects follow.
     """
 
     programs: str | None = None
-    max_shift: tuple[float, float] = ALIGN_MAX_SHIFT
+    max_shift: tuple[float, float | None] | None = None
     keep_config: bool = False
     partial: bool = False
     templates: Path | None = None
     robot: RobotModel | None = None
+    inverse: bool = False
+    bases: Literal["kept", "remeasured"] = "kept"
+    max_residual: float = MAX_RESIDUAL
+    any_source: bool = False
+    covariates: Path | None = None
+
+    def furthest(self, kind: str) -> tuple[float, float]:
+        """Limits of a shift, mm and degrees, for a calibration of a kind."""
+        usual = THEORY_MAX_SHIFT if kind == "theory" else MEASURED_MAX_SHIFT
+        if self.max_shift is None:
+            return usual
+        return self.max_shift[0], usual[1] if self.max_shift[1] is None else self.max_shift[1]

@@ -3,6 +3,18 @@
 from respot.simulation.backup import backup_files, files_of
 from respot.simulation.effects import EFFECTS, OUTSIDE
 from respot.simulation.line import LAYOUTS, Line, simulate
+from respot.simulation.rerun import Landing, rerun
 from respot.simulation.robots import ROBOTS
 
-__all__ = ["EFFECTS", "LAYOUTS", "OUTSIDE", "ROBOTS", "Line", "backup_files", "files_of", "simulate"]
+__all__ = [
+    "EFFECTS",
+    "LAYOUTS",
+    "OUTSIDE",
+    "ROBOTS",
+    "Landing",
+    "Line",
+    "backup_files",
+    "files_of",
+    "rerun",
+    "simulate",
+]

@@ -153,7 +153,7 @@ def simulate(
     cell = draw_cell(spec, spots, layout, rail or "rail" in names, seed)
     state = State(cell.n)
     truth = [_impose(wish, cell, state, number, seed) for number, wish in enumerate(wishes)]
-    chance = _chance(seed, "measuring")
+    chance = chance_of(seed, "measuring")
     world2tracker = _registration(chance)
     turn, shift = Rotation.from_matrix(world2tracker[:3, :3]), world2tracker[:3, 3]
     real = turn.apply(state.positions(cell)) + shift
@@ -192,12 +192,12 @@ def simulate(
 
 def draw_cell(spec: RobotSpec, spots: int, layout: str, rail: bool, seed: int) -> Cell:
     """Draw robot, gun, spots and columns: all that no effect touches."""
-    chance = _chance(seed, "layout")
+    chance = chance_of(seed, "layout")
     gun = draw_gun(chance)
     drawn = draw_layout(spec, gun, spots, layout, rail, chance)
     frames = forward(spec, drawn.joints, root_at=drawn.root_at)
     around = np.array([chance.uniform(1500, 3500), chance.choice([-1, 1]) * chance.uniform(3000, 4500), 1600.0])
-    return Cell(spec, gun, drawn, draw_columns(drawn, layout, _chance(seed, "columns")), frames, around)
+    return Cell(spec, gun, drawn, draw_columns(drawn, layout, chance_of(seed, "columns")), frames, around)
 
 
 def rigid_rest(here: Floats, there: Floats) -> Floats:
@@ -215,8 +215,8 @@ def rms(residuals: Floats) -> float:
 
 def _impose(wish: Wish, cell: Cell, state: State, number: int, seed: int) -> dict[str, Any]:
     """Draw an effect, give it its size, add it to the line, and return its truth."""
-    effect = make_effect(wish, cell, _chance(seed, wish.name, number))
-    size = _amplitude(effect, cell, 1.0 if wish.size is None else wish.size)
+    effect = make_effect(wish, cell, chance_of(seed, wish.name, number))
+    size = amplitude(effect, cell, wish.size)
     left, raw = _leaves(effect, cell, size)
     effect.push(state, size)
     return {
@@ -241,11 +241,17 @@ def _leaves(effect: Effect, cell: Cell, size: float) -> tuple[float, float]:
     return rms(rigid_rest(programmed, real)), rms(real - programmed)
 
 
-def _amplitude(effect: Effect, cell: Cell, wanted: float) -> float:
-    """Amplitude at which an effect leaves what is wanted; shifts are all but proportional to it."""
+def amplitude(effect: Effect, cell: Cell, wish: float | None) -> float:
+    """Amplitude at which an effect leaves what is wished [mm], 1 mm by default; shifts are all but proportional to it.
+
+    Raises
+    ------
+    ValueError
+        The effect moves no spot.
+    """
     if effect.fixed:
         return 1.0
-    size = 1.0
+    size, wanted = 1.0, 1.0 if wish is None else wish
     for _ in range(12):
         left, raw = _leaves(effect, cell, size)
         now = left if left > _SWALLOWED * raw else raw
@@ -257,7 +263,7 @@ def _amplitude(effect: Effect, cell: Cell, wanted: float) -> float:
     return size
 
 
-def _chance(seed: int, what: str, number: int = 0) -> np.random.Generator:
+def chance_of(seed: int, what: str, number: int = 0) -> np.random.Generator:
     """Return a source of chance of its own for each thing that is drawn."""
     return np.random.default_rng([seed, zlib.crc32(what.encode()), number])
 

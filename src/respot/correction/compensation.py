@@ -1,0 +1,330 @@
+"""Programs that make the real robot land where the old ones said, and the way back.
+
+A calibration says where a told pose P comes to: ``registration * E(P)``, with E its effects. Compensated programs tell
+P' with ``E(P') = G P`` in position and orientation: the registration R of a free frame is the tracker's own, and G is
+the rigid motion of the base that it swallows (`respot.correction.gauge`), or one where bases are measured anew. Where
+both frames claim to be the same, R is a deviation, and G its inverse: ``R E(P') = P``. The way back (``--inverse`` of a
+measured calibration) applies the effects: ``P = G^-1 E(P')``, with the G that the told poses define in the same way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform
+
+from respot.calibration.calibration import Calibration
+from respot.calibration.effects.moved import beyond
+from respot.correction.columns import SpotColumns
+from respot.correction.gauge import best_motion, same_motion, size_of
+from respot.correction.goals import Goal, goals_of, stacked
+from respot.correction.image import Direction
+from respot.correction.landing import Errors, Seats, landed, solve
+from respot.correction.points import new_offset
+from respot.correction.scope import Moving, Refusal, Scope
+from respot.correction.seats import Seated, Seating
+from respot.correction.written import Split
+from respot.geometry import IDENTITY, Array, distance_mm, turn_deg
+from respot.issues import Issue
+from respot.kinematics.cell import Reason, RobotCell
+from respot.languages import Language
+from respot.program.moves import Move
+from respot.program.robot import Robot
+
+Bases = Literal["kept", "remeasured"]
+Rows = NDArray[np.intp]
+
+#: One literal is right for several motions to it where their poses agree to this.
+_AGREE_MM, _AGREE_DEG = 1e-3, 1e-4
+_GAUGE_STEPS = 30
+_MOST_LISTED = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """What the programs are of, and what is known of their spots.
+
+    Parameters
+    ----------
+    robot : Robot
+    language : Language
+    kinematics : RobotCell or Reason
+        With the arm that the effects were fitted with.
+    spots : mapping of int to str
+        ID of the spot by `id` of the target.
+    columns : SpotColumns
+        What tables say of spots.
+    """
+
+    robot: Robot
+    language: Language
+    kinematics: RobotCell | Reason
+    spots: Mapping[int, str]
+    columns: SpotColumns
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What a person decided.
+
+    Parameters
+    ----------
+    inverse : bool
+        The other way round.
+    bases : str
+        ``kept`` or ``remeasured``: whether a rigid motion of all points under a base is left out of them.
+    max_residual : float
+        No target departs from the rigid motion of its path by more [mm].
+    """
+
+    inverse: bool
+    bases: Bases
+    max_residual: float
+
+
+class Compensation:
+    """The image of targets under the effects of a calibration: solved for, or applied.
+
+    Parameters
+    ----------
+    cell : Cell
+    calibration : Calibration
+    split : Split
+        Its effects.
+    choice : Choice
+    """
+
+    def __init__(self, cell: Cell, calibration: Calibration, split: Split, choice: Choice) -> None:
+        self._cell, self._split, self._choice = cell, split, choice
+        self._matched = frozenset(calibration.ids)
+        self._gauged = calibration.frame == "free"
+        # theory: the rigid part is what the simulation lacks; the floor is found by solving
+        self._solving = choice.inverse == (calibration.kind == "theory")
+        self._fixed = IDENTITY if self._gauged else calibration.source2reference.inv()
+        self._poses: dict[int, RigidTransform] = {}
+        self._offsets: dict[int, Array] = {}
+        self._bases: list[dict[str, Any]] = []
+        self.issues: list[Issue] = list(split.issues)
+
+    @property
+    def direction(self) -> Direction:
+        """For the real cell where poses are solved for; back to what the simulation shows otherwise."""
+        return "compensate" if self._solving else "align"
+
+    def pose(self, moving: Moving) -> RigidTransform:
+        """New ``target2base``."""
+        assert moving.target.pose is not None  # noqa: S101 - scope refuses it
+        return self._poses.get(id(moving), moving.target.pose)
+
+    def offset(self, move: Move) -> Array:
+        """New components (3,) of an offset along the base [mm]."""
+        assert move.offset is not None and move.base2spots is not None  # noqa: S101 - asked before
+        rigid = self._fixed if self._solving else self._fixed.inv()
+        found = self._offsets.get(id(move))
+        return new_offset(move.offset, move.base2spots, rigid) if found is None else found
+
+    def record(self) -> dict[str, Any]:
+        """What is written, what is not, and what of the bases was left to the registration."""
+        return {
+            "effects_written": list(self._split.written),
+            "effects_not_written": list(self._split.left),
+            "bases": self._choice.bases if self._gauged else None,
+            "left_to_registration": self._bases,
+        }
+
+    def see(self, scope: Scope) -> Sequence[Refusal]:
+        """Solve for all targets at once."""
+        goals, offsets = goals_of(scope, self._cell.spots)
+        with_rail = any(term.effect == "rail" for term in self._split.errors.terms)
+        cell = self._cell
+        seating = Seating(
+            cell.robot,
+            cell.language,
+            cell.kinematics,
+            scope,
+            cell.spots,
+            cell.columns,
+            self._split.of_the_arm,
+            with_rail,
+        )
+        errors, idle = self._split.errors, self._split.errors.without("gun_deflection")  # an open gun does not bend
+        closed = seating.seat([goal for goal in goals if goal.welds], errors.terms)
+        open_ = seating.seat([*(goal for goal in goals if not goal.welds), *offsets], idle.terms)
+        motions = self._motions(errors, closed)
+        found: dict[int, RigidTransform] = {}
+        objections = {**closed.objections, **open_.objections}
+        for some, seated in ((errors, closed), (idle, open_)):
+            self._apply(some, seated, motions, found, objections)
+        self.issues += _beyond(errors, closed) + _beyond(idle, open_)
+        refusals = self._take(goals, offsets, found, objections)
+        return [*refusals, *self._departures(goals, found)]
+
+    # --- the gauge
+
+    def _motions(self, errors: Errors, closed: Seated) -> dict[Hashable, RigidTransform]:
+        """G of each base; of a base without matched spots the first one's."""
+        if not self._gauged or self._choice.bases == "remeasured":
+            return {}
+        motions: dict[Hashable, RigidTransform] = {}
+        for key, rows in self._bodies(closed).items():
+            seats = closed.seats.rows(rows)
+            motion = self._gauge(errors, seats)
+            motions[key] = motion
+            shift, turn = size_of(motion, seats.observations.positions)
+            base = str(closed.goals[rows[0]].move.base)
+            self._bases.append({"base": base, "spots": len(rows), "shift_mm": shift, "turn_deg": turn})
+            message = (
+                f"of {base} a rigid motion of {shift:.3f} mm and {turn:.4f} degrees of all {len(rows)} spots is not "
+                "written: a tracker that stands anywhere cannot tell it from its own place. Where the base is measured "
+                "anew by the tracker, --bases remeasured writes it"
+            )
+            self.issues.append(Issue("RIGID_PART_KEPT", message))
+        return motions
+
+    def _bodies(self, closed: Seated) -> dict[Hashable, Rows]:
+        """Rows of the fitted spots of each base, each target once."""
+        found: dict[Hashable, list[int]] = {}
+        seen: set[int] = set()
+        for row, goal in enumerate(closed.goals):
+            if goal.spot in self._matched and goal.target is goal.move.target and id(goal.target) not in seen:
+                seen.add(id(goal.target))
+                found.setdefault(_key(goal), []).append(row)
+        return {key: np.array(rows, dtype=np.intp) for key, rows in found.items()}
+
+    def _gauge(self, errors: Errors, seats: Seats) -> RigidTransform:
+        """G of a body of spots: the best motion from told poses to where they land."""
+        told = seats.observations.positions
+        if not self._solving:
+            now, _ = seats.at(seats.poses)
+            return best_motion(told, np.asarray(landed(errors, now).translation))
+        motion, start = IDENTITY, None
+        for _ in range(_GAUGE_STEPS):
+            solution = solve(errors, seats, motion * seats.poses, start)
+            start = solution.seats.poses
+            rows = solution.found
+            there = np.asarray(motion.apply(told))
+            better = best_motion(solution.seats.observations.positions[rows], there[rows])
+            still = same_motion(motion, better, told)
+            motion = better
+            if still:
+                break
+        return motion
+
+    # --- images
+
+    def _apply(
+        self,
+        errors: Errors,
+        seated: Seated,
+        motions: Mapping[Hashable, RigidTransform],
+        found: dict[int, RigidTransform],
+        objections: dict[int, tuple[str, str]],
+    ) -> None:
+        """Images of goals in the source frame, by `id`; goals that have none go to the objections."""
+        if not seated.goals:
+            return
+        motion = stacked(motions.get(_key(goal), self._fixed) for goal in seated.goals)
+        if self._solving:
+            solution = solve(errors, seated.seats, motion * seated.seats.poses)
+            images, good, reached = solution.seats.poses, solution.found, solution.reached
+            left = solution.left_mm
+        else:
+            now, reached = seated.seats.at(seated.seats.poses)
+            images, good, left = motion.inv() * landed(errors, now), reached, np.zeros(len(now))
+        for row, goal in enumerate(seated.goals):
+            if good[row]:
+                found[id(goal)] = images[row]
+            elif not reached[row]:
+                objections[id(goal)] = ("OUT_OF_REACH", "out of reach: the robot cannot go where it would land right")
+            else:
+                message = f"no pose lands it where it should: {left[row]:.3g} mm are left. The effects are too large"
+                objections[id(goal)] = ("EFFECTS_TOO_LARGE", message)
+
+    def _take(
+        self,
+        goals: Sequence[Goal],
+        offsets: Sequence[Goal],
+        found: Mapping[int, RigidTransform],
+        objections: Mapping[int, tuple[str, str]],
+    ) -> list[Refusal]:
+        """Keep new poses and offsets; refuse what has none, or several."""
+        refusals: list[Refusal] = []
+        by_target: dict[int, list[Goal]] = {}
+        for goal in goals:
+            by_target.setdefault(id(goal.moving), []).append(goal)
+        for some in by_target.values():
+            moving = some[0].moving
+            assert moving is not None  # noqa: S101 - goals of targets have one
+            objection = next((objections[id(goal)] for goal in some if id(goal) in objections), None)
+            if objection is not None:
+                refusals += moving.refusals(*objection)
+                continue
+            poses = [goal.target_of(goal.base2spots.inv() * found[id(goal)]) for goal in some]
+            if all(_agree(poses[0], pose) for pose in poses[1:]):
+                self._poses[id(moving)] = poses[0]
+                continue
+            apart = max(float(distance_mm(poses[0], pose)) for pose in poses)
+            message = f"its motions need poses {apart:.3f} mm apart (tool, or side of play): one literal cannot be both"
+            refusals += moving.refusals("SHARED_TARGET", message)
+        by_literal = {id(goal.target): goal.moving for goal in goals if goal.moving is not None}
+        for goal in offsets:
+            anchor = by_literal.get(id(goal.target))
+            if anchor is None or id(anchor) not in self._poses:
+                continue
+            if id(goal) in objections:
+                code, message = objections[id(goal)]
+                move = goal.move
+                refusals.append(Refusal(move.program, goal.target.name, code, message, move.path, move.line))
+                continue
+            there = goal.base2spots.inv() * found[id(goal)]
+            self._offsets[id(goal.move)] = goal.offset_to(there, self._poses[id(anchor)])
+        return refusals
+
+    def _departures(self, goals: Sequence[Goal], found: Mapping[int, RigidTransform]) -> list[Refusal]:
+        """Targets that leave the rigid motion of their program's path by more than a person allows."""
+        programs: dict[str, list[Goal]] = {}
+        for goal in goals:
+            if id(goal) in found:
+                programs.setdefault(goal.move.program, []).append(goal)
+        refusals: list[Refusal] = []
+        for some in programs.values():
+            old = np.array([(goal.base2spots * goal.pose).translation for goal in some])
+            new = np.array([found[id(goal)].translation for goal in some])
+            apart = np.linalg.norm(new - np.asarray(best_motion(old, new).apply(old)), axis=1)
+            for row in np.flatnonzero(apart > self._choice.max_residual).tolist():
+                message = (
+                    f"would leave the rigid motion of its path by {apart[row]:.1f} mm; --max-residual allows "
+                    f"{self._choice.max_residual:g}"
+                )
+                moving = some[row].moving
+                refusals += [] if moving is None else moving.refusals("RESIDUAL_TOO_LARGE", message)
+        return refusals
+
+
+def _key(goal: Goal) -> Hashable:
+    """What bases have in common that lie in the same place."""
+    return tuple((np.round(goal.base2spots.as_matrix(), 6) + 0.0).ravel().tolist())
+
+
+def _agree(one: RigidTransform, other: RigidTransform) -> bool:
+    return float(distance_mm(one, other)) <= _AGREE_MM and float(turn_deg(one, other)) <= _AGREE_DEG
+
+
+def _beyond(errors: Errors, seated: Seated) -> list[Issue]:
+    """One issue for each effect that is used outside the range that it was fitted to."""
+    issues = []
+    for term in errors.terms if len(seated.seats) else ():
+        rows = np.flatnonzero(beyond(seated.seats.observations, term)).tolist()
+        if rows:
+            names = list(dict.fromkeys(seated.goals[row].target.name for row in rows))
+            more = f" and {len(names) - _MOST_LISTED} more" if len(names) > _MOST_LISTED else ""
+            message = (
+                f"{term.label} is written into {len(names)} targets outside the range of {term.own or 'angles'} that "
+                f"it was fitted to, where it is a guess: {', '.join(names[:_MOST_LISTED])}{more}"
+            )
+            issues.append(Issue("EXTRAPOLATED", message))
+    return issues

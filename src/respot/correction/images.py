@@ -1,0 +1,170 @@
+"""Which image a calibration makes of programs: a rigid motion, or effects that are solved for; or why none."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from pathlib import Path
+
+from respot.calibration.calibration import Calibration
+from respot.calibration.covariates import covariates_of
+from respot.calibration.source_fit import SourceFit
+from respot.calibration.stored import arm_of
+from respot.correction.columns import SpotColumns
+from respot.correction.compensation import Cell, Choice, Compensation
+from respot.correction.image import Image, RigidImage
+from respot.correction.options import CorrectionOptions
+from respot.correction.written import Split, split
+from respot.issues import BadInputError
+from respot.kinematics.cell import Reason, RobotCell
+from respot.kinematics.from_backup import cell_of
+from respot.kinematics.opw import OpwRobot
+from respot.languages import LANGUAGES
+from respot.spots import Source
+from respot.tables import read_table
+
+
+def mark_of(calibration: Calibration, *, inverse: bool) -> str:
+    """SHA-256 (hex) that tells a calibration, and the way it is applied, from others."""
+    own = calibration.content_hash
+    return hashlib.sha256(f"inverse {own}".encode("ascii")).hexdigest() if inverse else own
+
+
+def image_of(
+    calibration: Calibration, fitted: SourceFit | None, source: Source, options: CorrectionOptions, path: str
+) -> Image:
+    """Choose the image.
+
+    Parameters
+    ----------
+    calibration : Calibration
+    fitted : SourceFit or None
+        The fit it comes from; None where it was loaded.
+    source : Source
+        What is converted.
+    options : CorrectionOptions
+    path : str
+        The calibration, or the reference that it was fitted to, for messages.
+
+    Raises
+    ------
+    BadInputError
+        Nothing can be written, or not rightly.
+    """
+    effects = bool(calibration.terms) or calibration.tool_offset is not None
+    forward = calibration.kind == "theory" and not options.inverse
+    if forward:
+        _refuse_effects(calibration, path)
+    if not effects:
+        return _rigid(calibration, options)
+    if fitted is None and calibration.kind == "measured" and not options.inverse:
+        _refuse_other_state(calibration, source, options, path)
+    parts = split(calibration, path)
+    cell = _cell(calibration, parts, fitted, source, options)
+    return Compensation(cell, calibration, parts, Choice(options.inverse, options.bases, options.max_residual))
+
+
+def _rigid(calibration: Calibration, options: CorrectionOptions) -> Image:
+    if calibration.kind == "theory":
+        if options.inverse:
+            return RigidImage(calibration.source2reference.inv(), "compensate")
+        return RigidImage(calibration.source2reference, "align")
+    if calibration.frame == "same":  # both frames claim to be one: the rigid part is how far the robot is off
+        if options.inverse:
+            return RigidImage(calibration.source2reference, "align")
+        return RigidImage(calibration.source2reference.inv(), "compensate")
+    message = (
+        "a measured reference without effects registers two coordinate systems and has nothing to compensate; "
+        "to move programs onto another list of spots, give it with --theory"
+    )
+    raise BadInputError("BAD_OPTION", message)
+
+
+def _refuse_effects(calibration: Calibration, path: str) -> None:
+    """Aligning by the rigid part alone would leave every spot off by its effects."""
+    if calibration.tool_offset is not None:
+        message = (
+            "the calibration has a tool offset: moving points by its rigid part alone would leave every spot off by "
+            "the offset, and whether the tool or the points are to be corrected is for you to say: correct the TCP, "
+            "fit again and convert, or fit with --effects swapped_ids"
+        )
+        raise BadInputError("BAD_OPTION", message, path)
+    if calibration.terms:
+        names = ", ".join(term.label for term in calibration.terms)
+        message = (
+            f"the calibration has effects ({names}), which move each spot by itself: aligning programs by them is "
+            "not built yet; remove the cause and fit again, or fit with --effects swapped_ids"
+        )
+        raise BadInputError("BAD_OPTION", message, path)
+
+
+def _refuse_other_state(calibration: Calibration, source: Source, options: CorrectionOptions, path: str) -> None:
+    """Effects hold for the joints, tools and bases of the programs that were measured."""
+    stated = calibration.provenance.get("source_sha256")
+    if options.any_source or stated == source.sha256:
+        return
+    first = calibration.provenance.get("source", "an unnamed source")
+    message = (
+        f"the calibration was fitted to another state of the programs ({first}); its effects hold for the joints, "
+        "tools and bases of that one. Fit again on this backup, or say --force if you know that they hold here"
+    )
+    raise BadInputError("ANOTHER_SOURCE", message, path)
+
+
+def _cell(
+    calibration: Calibration,
+    parts: Split,
+    fitted: SourceFit | None,
+    source: Source,
+    options: CorrectionOptions,
+) -> Cell:
+    """What is known of the robot and its spots.
+
+    Raises
+    ------
+    BadInputError
+        The arm matters, and no model of it is known, or its controller compensates it already.
+    """
+    robot, spots = source.robot, source.spots
+    assert robot is not None  # noqa: S101 - asked before
+    if any(move.external_tcp for move in spots.moves):
+        message = "the robot holds the part: effects of a gun on the robot are not written into its points"
+        raise BadInputError("EXTERNAL_TCP", message, str(source.path))
+    arm, _ = arm_of(calibration, options.robot, str(source.path), any_robot=options.any_source)
+    kinematics = cell_of(robot.machine, robot.language, arm if arm is not None else options.robot)
+    if parts.of_the_arm:
+        _check_arm(kinematics, parts, str(source.path))
+    named: Mapping[int, str] = {
+        id(move.target): name for name, move in zip(spots.ids, spots.moves, strict=True) if move.target is not None
+    }
+    language = LANGUAGES[robot.language].with_plant(source.backup.profiles if source.backup is not None else ())
+    return Cell(robot, language, kinematics, named, _columns(fitted, options.covariates))
+
+
+def _check_arm(kinematics: RobotCell | Reason, parts: Split, path: str) -> None:
+    names = ", ".join(parts.written)
+    if isinstance(kinematics, Reason) or not isinstance(kinematics.model, OpwRobot):
+        why = kinematics.message if isinstance(kinematics, Reason) else "its wrist is not spherical"
+        message = (
+            f"effects of the arm ({names}) need the joints of every target, and no kinematic model is known: {why}; "
+            "name the robot with --robot"
+        )
+        raise BadInputError("NO_KINEMATICS", message, path)
+    if kinematics.absolute_accuracy:
+        message = (
+            f"the controller compensates the arm's own errors, and the calibration has effects of the arm ({names}): "
+            "they would be corrected twice. Fit again; on such a robot effects of the arm are not looked for"
+        )
+        raise BadInputError("ABSOLUTE_ACCURACY", message, path)
+
+
+def _columns(fitted: SourceFit | None, covariates: Path | None) -> SpotColumns:
+    """What tables say of spots: of ``--covariates``, else of the reference that was fitted to."""
+    if covariates is not None:
+        table = read_table(covariates, pose_needed=False)
+        found, _ = covariates_of(table.columns, table.numbers, ("id", "x", "y", "z"), constant=True)
+        return SpotColumns(table.ids, found)
+    seen = None if fitted is None else fitted.fit.observations
+    if fitted is None or seen is None or len(seen) != len(fitted.fit.ids):
+        return SpotColumns()
+    return SpotColumns(fitted.fit.ids, seen.columns)

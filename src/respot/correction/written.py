@@ -1,0 +1,120 @@
+"""Which effects of a calibration a program point can make good, and which only a person can.
+
+What robot, tool or part do at a place, each time they are there, is written into the points of that place. What comes
+and goes is not: a new cap, a warm motor or another day would find it in the points where it is no longer in the cell.
+An error of reading or of measuring moved no spot at all. A wrong frame is a wrong number in the program: corrected
+there, all poses and joints that the other effects were fitted at become those of the program.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from respot.calibration.calibration import Calibration
+from respot.calibration.effects.catalogue import MECHANISMS, OF_THE_ARM
+from respot.calibration.effects.term import Term
+from respot.correction.landing import Errors
+from respot.geometry import Array
+from respot.issues import BadInputError, Issue
+
+#: Effects that are properties of robot, tool or part.
+WRITTEN = frozenset(
+    {
+        "tool_offset",
+        "scale",
+        "joint_zero",
+        "joint_profile",
+        "gear",
+        "link_length",
+        "link_geometry",
+        "gravity_sag",
+        "gun_sag",
+        "gun_deflection",
+        "backlash",
+        "group_shift",
+        "rail",
+        "deformation",
+    }
+)
+#: Columns that name a measurement, not a part of the cell.
+_OF_MEASURING = re.compile(r"(.*_)?(session|messreihe)(_?(no|id|name|nr))?")
+
+
+@dataclass(frozen=True, eq=False)
+class Split:
+    """The effects of a calibration by what becomes of them.
+
+    Parameters
+    ----------
+    errors : Errors
+        What is written into points.
+    issues : sequence of Issue
+        What of each effect a person must, or must not, do.
+    written, left : sequences of str
+        Labels of the effects that are written, and of those that are not.
+    """
+
+    errors: Errors
+    issues: Sequence[Issue]
+    written: Sequence[str]
+    left: Sequence[str]
+
+    @property
+    def of_the_arm(self) -> bool:
+        """Whether the joints of each place matter."""
+        return any(term.effect in OF_THE_ARM for term in self.errors.terms)
+
+
+def split(calibration: Calibration, path: str) -> Split:
+    """Split the effects of a calibration.
+
+    Parameters
+    ----------
+    calibration : Calibration
+    path : str
+        Its file, for messages.
+
+    Raises
+    ------
+    BadInputError
+        ``WRONG_FRAME`` where spots lie under another frame than is written.
+    """
+    kept: list[tuple[Term, Array]] = []
+    issues: list[Issue] = []
+    for term, value in zip(calibration.terms, calibration.values, strict=True):
+        remedy = MECHANISMS[term.effect].remedy(term, value).text
+        if term.effect == "wrong_frame":
+            message = (
+                f"{remedy} Points are not the place for it: correct the name of the frame in the programs, or its "
+                "data, then fit again and convert"
+            )
+            raise BadInputError("WRONG_FRAME", message, path)
+        if is_written(term):
+            kept.append((term, value))
+            message = f"{term.label} is written into the points: do not put it right elsewhere as well. {remedy}"
+            issues.append(Issue("EFFECT_WRITTEN", message, path))
+        else:
+            issues.append(Issue("EFFECT_NOT_WRITTEN", f"{term.label} is not written into points. {remedy}", path))
+    if calibration.tool_offset is not None:
+        x, y, z = calibration.tool_offset.tolist()
+        message = (
+            f"tool_offset {x:+.2f} {y:+.2f} {z:+.2f} mm is written into the points: leave the TCP in the tool data as "
+            "it is. Correct the tool or the points, never both"
+        )
+        issues.append(Issue("EFFECT_WRITTEN", message, path))
+    offset = [] if calibration.tool_offset is None else ["tool_offset"]
+    return Split(
+        Errors([term for term, _ in kept], [value for _, value in kept], calibration.tool_offset),
+        issues,
+        [*offset, *(term.label for term, _ in kept)],
+        [term.label for term in calibration.terms if not is_written(term)],
+    )
+
+
+def is_written(term: Term) -> bool:
+    """Whether a point can make an effect good."""
+    if term.effect == "group_shift" and _OF_MEASURING.fullmatch(str(term.where.get("column", "")).strip().casefold()):
+        return False
+    return term.effect in WRITTEN
