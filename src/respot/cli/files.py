@@ -41,7 +41,7 @@ def write_text(path: Path, text: str) -> None:
 
 
 def holds(source: Path, output: Path) -> bool:
-    """Whether writing ``output`` would change ``source``: it is the same file, its data list, or a file in its folder."""
+    """Whether writing ``output`` would change ``source``: the file itself, its data list, or a file in its folder."""
     own, other = source.resolve(), output.resolve()
     one_program = {own.suffix.lower(), other.suffix.lower()} <= {".src", ".dat"}
     return own == other or own in other.parents or (one_program and own.with_suffix("") == other.with_suffix(""))
