@@ -30,8 +30,9 @@ def lines(changes: list[dict], side: str) -> Counter[str]:
     return Counter(line.replace(",\\WObj", "\\WObj") for line in found)
 
 
-#: What all inline forms have in common: which of two forms such a statement belongs to, nobody can tell.
-COMMON = ("$BWDSTART", "BAS(")
+#: What all inline forms have in common, and a wait beside a point that went while another came: which of two forms such
+#: a statement belongs to, nobody can tell (seed 901, 7 edits).
+COMMON = ("$BWDSTART", "BAS(", "WAIT SEC")
 
 
 def telling(found: Counter[str]) -> Counter[str]:
