@@ -7,6 +7,7 @@ archive is opened. What could be written outside its folder, or over another fil
 from __future__ import annotations
 
 import lzma
+import os
 import struct
 import unicodedata
 import zipfile
@@ -107,7 +108,7 @@ def _with_issues(path: Path, files: dict[str, bytes], issues: list[Issue]) -> Tr
 def _read_folder(path: Path) -> dict[str, bytes]:
     found: list[Path] = []
     size = 0
-    for file in sorted(path.rglob("*")):
+    for file in _below(path):
         if file.is_symlink():
             raise BadInputError("UNSAFE_ARCHIVE", "is a link; copy the backup without links", str(file))
         if file.is_file():
@@ -117,6 +118,16 @@ def _read_folder(path: Path) -> dict[str, bytes]:
             raise BadInputError("UNSAFE_ARCHIVE", "is neither file nor folder; copy the backup without it", str(file))
     _check_size(path, len(found), size)
     return {file.relative_to(path).as_posix(): file.read_bytes() for file in found}
+
+
+def _below(path: Path) -> list[Path]:
+    """Everything below a folder, sorted; a folder that may not be listed is an error, never an empty one."""
+
+    def refuse(error: OSError) -> None:
+        raise BadInputError("CANNOT_READ", error.strerror or str(error), str(error.filename)) from error
+
+    walk = os.walk(path, onerror=refuse)
+    return sorted(Path(folder, name) for folder, folders, files in walk for name in (*folders, *files))
 
 
 def _read_file(path: Path) -> dict[str, bytes]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import stat
 import zipfile
 import zlib
@@ -167,6 +168,23 @@ def test_a_link_to_a_folder_is_not_followed(respot, tmp_path):
     (folder / "KRC" / "R1" / "round").symlink_to(folder, target_is_directory=True)
     result = respot("inspect", "linked")
     assert result.code == 2 and "is a link" in result.err
+
+
+def test_a_folder_that_may_not_be_listed_is_no_empty_folder(respot, tmp_path, monkeypatch):
+    closed = tmp_path / "backup" / "KRC" / "R1"
+    closed.mkdir(parents=True)
+    (closed / "a.src").write_text("DEF a()\nEND\n")
+    listing = os.scandir
+
+    def scandir(place="."):
+        if Path(place) == closed:
+            raise PermissionError(13, "Permission denied", str(place))
+        return listing(place)
+
+    monkeypatch.setattr(os, "scandir", scandir)
+    result = respot("inspect", tmp_path / "backup")
+    assert result.code == 2
+    assert "CANNOT_READ" in result.err and str(closed) in result.err
 
 
 def test_a_folder_with_two_cases_of_a_name(respot, tmp_path):
