@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from respot.calibration.calibration import Calibration
+from respot.calibration.effects.catalogue import MECHANISMS
 from respot.calibration.effects.moved import beyond
+from respot.calibration.effects.term import Term
 from respot.correction.columns import SpotColumns
 from respot.correction.gauge import best_motion, same_motion, size_of
 from respot.correction.goals import Goal, goals_of, stacked
@@ -151,17 +153,35 @@ class Compensation:
             self._split.of_the_arm,
             with_rail,
         )
-        errors, idle = self._split.errors, self._split.errors.without("gun_deflection")  # an open gun does not bend
-        closed = seating.seat([goal for goal in goals if goal.welds], errors.terms)
-        open_ = seating.seat([*(goal for goal in goals if not goal.welds), *offsets], idle.terms)
-        motions = self._motions(errors, closed)
+        closed, others = self._states(goals, offsets)
+        errors = self._split.errors
+        first = seating.seat(closed, errors.terms)
+        motions = self._motions(errors, first)
+        seated = [(errors, first), *((some, seating.seat(of, some.terms)) for some, of in others)]
         found: dict[int, RigidTransform] = {}
-        objections = {**closed.objections, **open_.objections}
-        for some, seated in ((errors, closed), (idle, open_)):
-            self._apply(some, seated, motions, found, objections)
-        self.issues += _beyond(errors, closed) + _beyond(idle, open_)
+        objections: dict[int, tuple[str, str]] = {}
+        for some, places in seated:
+            objections |= places.objections
+            self._apply(some, places, motions, found, objections)
+            self.issues += _beyond(some, places)
         refusals = self._take(goals, offsets, found, objections)
         return [*refusals, *self._departures(goals, found)]
+
+    def _states(
+        self, goals: Sequence[Goal], offsets: Sequence[Goal]
+    ) -> tuple[list[Goal], list[tuple[Errors, list[Goal]]]]:
+        """Goals with the fitted tool closed; and all others, with the errors that are left there."""
+        tools = {_tool(goal) for goal in goals if goal.spot in self._matched}
+        fitted = [goal for goal in (*goals, *offsets) if _tool(goal) in tools]
+        closed = [goal for goal in fitted if goal.welds]
+        opened = [goal for goal in fitted if not goal.welds]
+        foreign = [goal for goal in (*goals, *offsets) if _tool(goal) not in tools]
+        errors = self._split.errors
+        if foreign and (errors.tool_offset is not None or any(_of_tool(term) for term in errors.terms)):
+            names = list(dict.fromkeys(str(goal.move.tool) for goal in foreign))
+            message = f"errors of the tool are those of the fitted spots' own: targets of {', '.join(names)} go without"
+            self.issues.append(Issue("NOT_CHECKED", message))
+        return closed, [(errors.of_an_open_gun(), opened), (errors.of_another_tool(), foreign)]
 
     # --- the gauge
 
@@ -308,6 +328,18 @@ class Compensation:
 def _key(goal: Goal) -> Hashable:
     """What bases have in common that lie in the same place."""
     return tuple((np.round(goal.base2spots.as_matrix(), 6) + 0.0).ravel().tolist())
+
+
+def _tool(goal: Goal) -> Hashable:
+    """What tools have in common that are the same."""
+    tool = goal.move.tool
+    if tool is None or tool.pose is None:
+        return None
+    return tuple((np.round(tool.pose.as_matrix(), 6) + 0.0).ravel().tolist())
+
+
+def _of_tool(term: Term) -> bool:
+    return MECHANISMS[term.effect].acts == "tool"
 
 
 def _agree(one: RigidTransform, other: RigidTransform) -> bool:

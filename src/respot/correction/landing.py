@@ -9,13 +9,14 @@ digit; tool offsets take one.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
+from respot.calibration.effects.catalogue import MECHANISMS
 from respot.calibration.effects.moved import moved
 from respot.calibration.effects.term import Term
 from respot.calibration.observations import Observations
@@ -47,9 +48,17 @@ class Errors:
     values: Sequence[Array]
     tool_offset: Array | None = None
 
-    def without(self, effect: str) -> Errors:
-        """Return the errors without one effect."""
-        kept = [(term, value) for term, value in zip(self.terms, self.values, strict=True) if term.effect != effect]
+    def of_an_open_gun(self) -> Errors:
+        """Return the errors where the gun does not squeeze: nothing bends it."""
+        return self._kept(lambda term: term.effect != "gun_deflection")
+
+    def of_another_tool(self) -> Errors:
+        """Return the errors with another tool on the flange: what the fitted one has of its own stays away."""
+        kept = self._kept(lambda term: MECHANISMS[term.effect].acts != "tool")
+        return replace(kept, tool_offset=None)
+
+    def _kept(self, wanted: Callable[[Term], bool]) -> Errors:
+        kept = [(term, value) for term, value in zip(self.terms, self.values, strict=True) if wanted(term)]
         return replace(self, terms=[term for term, _ in kept], values=[value for _, value in kept])
 
 

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform
 
 from respot.calibration.covariates import Covariate
 from respot.calibration.effects.moved import missing
@@ -26,6 +25,9 @@ from respot.kinematics.motion_chain import stacked as stacked_chains
 from respot.kinematics.opw import OpwRobot
 from respot.languages import Language
 from respot.program.robot import Robot
+
+#: No place at all.
+_NOWHERE = Seats(Observations(np.empty((0, 3))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,14 +97,18 @@ class Seating:
             else:
                 kept.append(goal)
                 chains.append(chain)
+        if not kept:
+            return Seated([], _NOWHERE, objections)
         seats = self._seats(kept, chains)
         good = np.ones(len(kept), dtype=np.bool_)
-        for term in terms if kept else ():
+        for term in terms:
             unknown = _unknown(seats.observations, term, self.columns, kept)
             for row in np.flatnonzero(unknown & good):
                 objections[id(kept[row])] = ("EFFECT_NOT_KNOWN", _why(term))
             good &= ~unknown
         rows = np.flatnonzero(good)
+        if not len(rows):
+            return Seated([], _NOWHERE, objections)
         return Seated([kept[row] for row in rows], seats.rows(rows), objections)
 
     def _chain(self, goal: Goal) -> Chain | Reason | None:
@@ -128,7 +134,7 @@ class Seating:
         return chain
 
     def _seats(self, goals: Sequence[Goal], chains: Sequence[Chain | None]) -> Seats:
-        worlds = stacked(goal.base2spots * goal.pose for goal in goals) if goals else RigidTransform.identity(0)
+        worlds = stacked(goal.base2spots * goal.pose for goal in goals)
         known = [chain for chain in chains if chain is not None]
         chained = stacked_chains(known) if known and len(known) == len(goals) else None
         base, gravity, external = IDENTITY, DOWN.copy(), None
@@ -156,7 +162,7 @@ class Seating:
 
     def _columns_at(self, goals: Sequence[Goal]) -> dict[str, Covariate]:
         found = self.columns.of(self.columns.rows_of(names_at(goals, self._ahead)))
-        if not (self.with_arm and goals):
+        if not self.with_arm:
             return found
         strict, likely = self._runs.sides, self._runs.likely
         nothing = np.full(6, np.nan)
