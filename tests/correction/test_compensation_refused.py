@@ -224,20 +224,27 @@ def plant(tmp_path_factory):
     return cell(tmp_path_factory.mktemp("plant"), KUKA, "joint_zero@3", spots=30)
 
 
-def test_the_same_measurement_does_not_compensate_twice(plant, tmp_path, capsys):
+def test_compensated_points_are_not_compensated_again(plant, tmp_path):
+    """They no longer say where spots should be: neither the old measurement nor a fresh one tells that."""
     made = plant.convert(tmp_path / "out", ("joint_zero",))
     made.calibration.save(tmp_path / "cal.json")
-    common = ["--noise", "0.1", "--effects", "joint_zero", "-o", str(tmp_path / "twice")]
-    again = CliRunner().invoke(app, ["convert", str(tmp_path / "out"), "--measured", str(plant.measured), *common])
-    assert again.exit_code == 2
-    assert "ALREADY_APPLIED" in again.stderr
-    stored = ["convert", str(tmp_path / "out"), "-c", str(tmp_path / "cal.json"), "-o", str(tmp_path / "twice")]
-    assert CliRunner().invoke(app, [*stored, "--force"]).exit_code == 2
-    assert not (tmp_path / "twice").exists()
-    # and the way back goes once
-    assert CliRunner().invoke(app, [*stored[:-1], str(tmp_path / "back"), "--inverse"]).exit_code == 0
-    back = ["convert", str(tmp_path / "back"), "-c", str(tmp_path / "cal.json"), "-o", str(tmp_path / "twice")]
-    assert CliRunner().invoke(app, [*back, "--inverse"]).exit_code == 2
+
+    def convert(source: str, out: str, *options: str):
+        return CliRunner().invoke(app, ["convert", str(tmp_path / source), *options, "-o", str(tmp_path / out)])
+
+    fit = ("--measured", str(plant.measured), "--noise", "0.1", "--effects", "joint_zero")
+    stored = ("-c", str(tmp_path / "cal.json"))
+    shutil.copytree(tmp_path / "out", tmp_path / "bare")
+    (tmp_path / "bare" / "respot.json").unlink()  # as the robot hands them back: headers alone
+    for source, options in (("out", fit), ("bare", fit), ("out", (*stored, "--force"))):
+        again = convert(source, "twice", *options)
+        assert again.exit_code == 2
+        assert "ALREADY_APPLIED" in again.stderr
+        assert not (tmp_path / "twice").exists()
+    # the way back goes once, and from there the way is open again
+    assert convert("bare", "back", *stored, "--inverse").exit_code == 0
+    assert convert("back", "twice", *stored, "--inverse").exit_code == 2
+    assert convert("back", "fresh", *fit).exit_code == 0
 
 
 def changed(plant, tmp_path: Path, pattern: str, old: str, new: str) -> Path:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,11 +15,12 @@ from respot.calibration.report import report
 from respot.calibration.source_fit import FitOptions, SourceFit, fit_source
 from respot.calibration.stored import load_calibration, source_issues
 from respot.correction.correction import Correction, correct
-from respot.correction.image import Image
+from respot.correction.image import Image, RigidImage
 from respot.correction.images import image_of, mark_of
 from respot.correction.options import CorrectionOptions
 from respot.issues import BadInputError, Issue
 from respot.languages import LANGUAGES
+from respot.languages.writing import says_compensated
 from respot.program.moves import Move
 from respot.program.robot import Robot
 from respot.spots import Source, read_source
@@ -149,8 +150,8 @@ def convert(
     image = image_of(model, fitted, read, options, str(calibration or reference))
     mark = mark_of(model, inverse=options.inverse)
     _refuse_recorded(read, _mark(mark, read.robot))
-    if fitted is not None and model.kind == "measured":
-        _refuse_old_measurement(read, fitted.reference)
+    if model.kind == "measured" and not options.inverse:
+        _refuse_compensated(read, read.robot)
     moves = _moves_of(read, ids)
     if not moves:
         detail = f": {read.spots.issues[0]}" if read.spots.issues else ""
@@ -158,6 +159,9 @@ def convert(
         raise BadInputError("NO_COMMON_IDS", message, str(source))
     language = LANGUAGES[read.robot.language].with_plant(read.backup.profiles if read.backup is not None else ())
     correction = correct(read.robot, language, image, model.kind, mark, moves, options)
+    if options.covariates is not None and isinstance(image, RigidImage):
+        message = "nothing uses --covariates: no effect of this calibration follows a column"
+        issues.append(Issue("OPTION_UNUSED", message, str(options.covariates)))
     refused = [
         Issue(refusal.code, f"{refusal.target}: {refusal.message}", refusal.path, refusal.line)
         for refusal in correction.refused
@@ -165,35 +169,42 @@ def convert(
     return Conversion(read, model, fitted, image, correction, [*issues, *refused, *correction.issues])
 
 
-def _recorded(source: Source, key: str) -> list[str]:
-    """Texts of a list of the backup's own record, which earlier conversions wrote."""
+def _record(source: Source) -> Mapping[str, Any]:
+    """The backup's own record, which an earlier conversion wrote; empty if there is none that can be read."""
     data = source.backup.files.get(RECORD) if source.backup is not None else None
-    if data is None:
-        return []
     try:
-        found = json.loads(data).get(key, [])
-    except (ValueError, AttributeError):
-        return []
-    return [item for item in found if isinstance(item, str)] if isinstance(found, list) else []
+        found = {} if data is None else json.loads(data)
+    except ValueError:
+        return {}
+    return found if isinstance(found, dict) else {}
 
 
 def _applied(source: Source) -> list[str]:
     """Hashes of the calibrations that the backup's own record says were applied to it."""
-    return _recorded(source, "applied")
+    applied = _record(source).get("applied", [])
+    return [item for item in applied if isinstance(item, str)] if isinstance(applied, list) else []
 
 
-def _measured(source: Source) -> list[str]:
-    """Hashes of the measurements that the backup's programs were compensated by."""
-    return _recorded(source, "measurements")
+def _refuse_compensated(source: Source, robot: Robot) -> None:
+    """Compensated points no longer say where spots should be: compensating them aims at the wrong places.
 
-
-def _refuse_old_measurement(source: Source, reference: Source) -> None:
-    if reference.sha256 in _measured(source):
+    Raises
+    ------
+    BadInputError
+        ``ALREADY_APPLIED``: the record, or a file's header, says that they are.
+    """
+    last = _record(source)
+    calibration = last.get("calibration")
+    kind = calibration.get("kind") if isinstance(calibration, dict) else None
+    place = str(source.path / RECORD) if (last.get("direction"), kind) == ("compensate", "measured") else None
+    headed = (path for path, file in robot.files.items() if says_compensated(file.source))
+    place = place or next(headed, None)
+    if place is not None:
         message = (
-            "these programs were compensated by this very measurement, which is of the programs before: what it shows "
-            "is in the points already. Measure the compensated programs, or start from the original"
+            "these programs were compensated before: their points no longer say where spots should be, and a fresh "
+            "measurement does not tell it either. Start from the original backup, or turn it back with --inverse first"
         )
-        raise BadInputError("ALREADY_APPLIED", message, str(source.path / RECORD))
+        raise BadInputError("ALREADY_APPLIED", message, place)
 
 
 def _mark(mark: str, robot: Robot) -> str:
@@ -215,9 +226,6 @@ def _moves_of(source: Source, ids: Sequence[str]) -> list[Move]:
 def record_of(conversion: Conversion) -> dict[str, Any]:
     """What ``respot.json`` holds: what was applied to what, so that a reader can check and never apply it twice."""
     correction, files = conversion.correction, conversion.files
-    model = conversion.calibration
-    own = model.provenance.get("reference_sha256") if model.kind == "measured" else None
-    measurements = [*_measured(conversion.source), *([own] if isinstance(own, str) else [])]
     return {
         "schema": "respot.convert/1",
         "version": __version__,
@@ -225,7 +233,6 @@ def record_of(conversion: Conversion) -> dict[str, Any]:
         "source_sha256": conversion.source.sha256,
         "verified": True,
         "applied": [*_applied(conversion.source), _mark(correction.calibration_hash, correction.robot)],
-        **({"measurements": measurements} if measurements else {}),
         "issues": [issue.as_json() for issue in conversion.issues],
         "contents": {path: _sha256(correction.files.get(path, data)) for path, data in files.items()},
         "files": {

@@ -143,6 +143,7 @@ def templates(language: str, overlay: Path | None = None) -> Templates:
 
 #: A line of a header of ours, whatever the comment mark: ``;respot: ..``, ``  !respot: ..``
 _HEADER_LINE = re.compile(r"[ \t]*[;!]respot: [^\r\n]*(?:\r*\n|\r|$)")
+_COMPENSATED = re.compile(r"[;!]respot: \S+ compensate measured\b")
 _APPLIED = re.compile(r"[;!]respot: (?:earlier )?calibration sha256 ([0-9a-f]{64})")
 
 
@@ -161,6 +162,11 @@ def header_span(source: SourceText, after_line: int) -> Span:
 def applied_calibrations(source: SourceText) -> set[str]:
     """Hashes of the calibrations that the file's header names."""
     return set(_APPLIED.findall(source.text))
+
+
+def says_compensated(source: SourceText) -> bool:
+    """Whether the file's header says that its points were compensated by a measurement, and not turned back since."""
+    return _COMPENSATED.search(source.text) is not None
 
 
 def changes_of(
