@@ -79,12 +79,13 @@ def test_a_retrofit_takes_the_old_calibration_up_and_the_new_one_down(tmp_path, 
     assert float(turn_deg(first, second).max()) < 1e-3
 
 
-def test_effects_of_a_theory_calibration_are_solved_for_on_the_way_down(tmp_path):
+@pytest.mark.parametrize("frame", ["same", "free"])
+def test_effects_of_a_theory_calibration_are_solved_for_on_the_way_down(tmp_path, frame):
     """The floor grows by 2 mm/m: the simulation's programs must be told to go less far there."""
     scale = Term("scale", {}, (Parameter("growth", "mm/m", 2.0),), {"centre": [0.0, 0.0, 0.0]})
     spots = read_source(SAMPLES / "kuka", ()).spots
     shift = np.array([5.0, -3.0, 2.0])
-    model = Calibration(np.eye(3), shift, "theory", "same", tuple(spots.ids), terms=(scale,), values=(np.array([2.0]),))
+    model = Calibration(np.eye(3), shift, "theory", frame, tuple(spots.ids), terms=(scale,), values=(np.array([2.0]),))
     model.save(tmp_path / "cal.json")
     there = tmp_path / "down"
     made = respot("convert", SAMPLES / "kuka", "-c", tmp_path / "cal.json", "--inverse", "-o", there, "--json")

@@ -87,6 +87,13 @@ def test_the_real_robot_lands_where_the_old_programs_said(compensated, robot, ef
     assert after < 0.2 * before
 
 
+def test_a_robot_on_a_rail_is_compensated_where_it_stands(tmp_path):
+    plant = cell(tmp_path, KUKA, "joint_zero", spots=40, rail=True)
+    made = plant.convert(tmp_path / "out", ("joint_zero",))
+    assert not made.correction.refused
+    assert plant.error(tmp_path / "out") < 0.05 < 0.95 < plant.error(plant.backup)
+
+
 @pytest.mark.parametrize(("robot", "effect"), [(KUKA, "joint_zero"), (ABB, "gravity_sag")])
 def test_tools_stand_as_the_old_programs_said(compensated, robot, effect):
     done = compensated(robot, effect)

@@ -49,10 +49,20 @@ class Run:
             place.parent.mkdir(parents=True, exist_ok=True)
             place.write_bytes(text.replace("\n", "\r\n").encode("latin-1"))
 
-    def __call__(self, term: Term | None, value, *options: str, ids=tuple(SPOTS), force: bool = True, **more):
+    def __call__(
+        self,
+        term: Term | None,
+        value,
+        *options: str,
+        ids=tuple(SPOTS),
+        force=True,
+        frame="free",
+        shift=(0, 0, 0),
+        **more,
+    ):
         terms = () if term is None else (term,)
         values = () if term is None else (np.atleast_1d(np.asarray(value, dtype=float)),)
-        made = Calibration(np.eye(3), np.zeros(3), "measured", "free", ids, terms=terms, values=values, **more)
+        made = Calibration(np.eye(3), np.array(shift), "measured", frame, ids, terms=terms, values=values, **more)
         made.save(self.folder / "cal.json")
         out = self.folder / "out"
         shutil.rmtree(out, ignore_errors=True)
@@ -92,6 +102,20 @@ def test_a_scale_is_taken_off_where_bases_are_remeasured(tmp_path):
     assert done.record["direction"] == "compensate"
     assert done.record["bases"] == "remeasured"
     assert "compensate measured, for the real cell" in done.text("weld.dat")
+
+
+@pytest.mark.parametrize("growth", [0.0, GROWTH])
+def test_in_one_frame_the_rigid_part_is_an_error_too(tmp_path, growth):
+    """--frame same: the tracker stands in the robot's own coordinates, and sees it 3 mm off."""
+    shift = np.array([2.0, -1.0, 2.0])
+    run = Run(tmp_path, krl())
+    done = run(SCALE if growth else None, growth, frame="same", shift=shift)
+    assert done.code == 0, done.err
+    assert done.record["direction"] == "compensate"
+    for name, place in SPOTS.items():
+        told = in_world(krl_xyz(done, name))
+        lands = CENTRE + (told - CENTRE) * (1.0 + growth / 1000.0) + shift
+        assert lands == pytest.approx(place, abs=2e-3)
 
 
 TWO = {"T1": (100, 0, 0), "T2": (500, 0, 100), "T3": (100, 600, 0), "T4": (300, 300, 400), "T5": (0, 200, 350)}

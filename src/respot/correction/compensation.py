@@ -103,7 +103,8 @@ class Compensation:
     def __init__(self, cell: Cell, calibration: Calibration, split: Split, choice: Choice) -> None:
         self._cell, self._split, self._choice = cell, split, choice
         self._matched = frozenset(calibration.ids)
-        self._gauged = calibration.frame == "free"
+        # of a theory the rigid part is never the place of a tracker
+        self._gauged = calibration.kind == "measured" and calibration.frame == "free"
         # theory: the rigid part is what the simulation lacks; the floor is found by solving
         self._solving = choice.inverse == (calibration.kind == "theory")
         self._fixed = IDENTITY if self._gauged else calibration.source2reference.inv()

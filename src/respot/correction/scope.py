@@ -116,7 +116,12 @@ class _Finder:
         self._robot = robot
         held = {id(move) for move in spots}
         self._task_of = {id(move): routine.task for routine in robot.routines for move in routine.moves}
-        self._parts = [_Part(self._task_of[id(move)], move) for move in spots if move.workpiece is not None]
+        parts: dict[tuple[object, ...], _Part] = {}  # a part has many spots
+        for move in spots:
+            if move.workpiece is not None:
+                part = _Part(self._task_of[id(move)], move)
+                parts.setdefault(part.key, part)
+        self._parts = list(parts.values())
         self._several_parts = _held_frames(self._parts)
         self._welding = {id(r) for r in robot.routines if any(id(move) in held for move in r.moves)}
         self._core, self._wide = _routines(robot, self._welding, programs)
@@ -310,6 +315,11 @@ class _Part:
 
     task: str
     move: Move
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """What is alike of spots that are the same part in the same hands."""
+        return self.task, id(self.move.base), id(self.move.tool), self.move.external_tcp
 
     def carries(self, task: str, frame: Frame, external_tcp: bool) -> bool:
         own = self.move.workpiece
