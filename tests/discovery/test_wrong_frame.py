@@ -301,7 +301,7 @@ def test_programs_are_not_corrected_by_it(tmp_path):
     assert fit(Cell(three(real_base=6)), tmp_path, "-o", tmp_path / "cal.json").code == 0
     refused = run("convert", tmp_path / "backup", "-c", tmp_path / "cal.json", "-o", tmp_path / "out")
     assert refused.code == 2
-    assert "effects" in refused.err
+    assert "WRONG_FRAME" in refused.err
 
 
 def test_what_the_terminal_and_the_page_say(tmp_path):
