@@ -20,6 +20,9 @@ SAME_ROTATION_DEG = 1e-9
 #: A target under another name, used in the same way, is the same target up to this distance.
 RENAMED_WITHIN_MM = 10.0
 
+#: An axis that moves less than this between two targets does not move: play stays on the side that it came from.
+AXIS_MOVES_DEG = 0.02
+
 #: |q| of a programmed quaternion may differ from 1 by this much; pendants print six digits.
 QUATERNION_NORM = 1e-3
 

@@ -100,26 +100,11 @@ def names_of(effects: Effects) -> tuple[str, ...]:
     return names
 
 
-def find_causes(
-    ids: Sequence[str],
-    source: Array,
-    reference: Array,
-    rotations: Rotation | None,
-    effects: Effects,
-    observe: Observe | None,
-    *,
-    kind: str,
-    noise: float | None,
-    seed: int,
-    reference_rotations: Rotation | None = None,
-    written: Written | None = None,
-    nested: bool = True,
-    progress: Callable[[], None] = lambda: None,
-    same_frame: bool = False,
-) -> Causes:
-    """Look for causes among paired spots.
+@dataclass(frozen=True, eq=False)
+class Question:
+    """Paired spots, and what is asked of them.
 
-    Parameters
+    Attributes
     ----------
     ids, source, reference, rotations, kind, noise, seed
         As `respot.calibration.effects.search.search_effects`.
@@ -128,7 +113,7 @@ def find_causes(
         What else is known of the pairs; default their poses alone.
     reference_rotations : Rotation of n, optional
         Tool orientations of the reference, by the names as given.
-    written : Written, optional
+    written : Written
         How both lists write orientations; default as programs.
     nested : bool
         As `respot.calibration.discovery.discover.discover`.
@@ -136,46 +121,46 @@ def find_causes(
         Called as the work goes on.
     same_frame : bool
         Whether both coordinate systems claim to be the same.
+    """
+
+    ids: Sequence[str]
+    source: Array
+    reference: Array
+    rotations: Rotation | None
+    effects: Effects
+    kind: str
+    noise: float | None
+    seed: int
+    observe: Observe | None = None
+    reference_rotations: Rotation | None = None
+    written: Written = Written()
+    nested: bool = True
+    progress: Callable[[], None] = lambda: None
+    same_frame: bool = False
+
+
+def find_causes(asked: Question) -> Causes:
+    """Look for causes among paired spots.
 
     Raises
     ------
     RegistrationError
         As `names_of` and `search_effects`.
     """
-    looked_for, written = names_of(effects), written or Written()
-
-    def causes(frames: FrameSearch | None) -> Causes:
-        return _causes(
-            ids,
-            source,
-            reference,
-            rotations,
-            effects,
-            observe,
-            frames if frames is not None and frames.terms else None,
-            kind=kind,
-            noise=noise,
-            seed=seed,
-            reference_rotations=reference_rotations,
-            written=written,
-            nested=nested,
-            progress=progress,
-        )
-
-    if wrong_frame.NAME not in looked_for or observe is None:
-        return causes(None)
-    every = np.arange(len(ids), dtype=np.intp)
-    seen = replace(observe(every), positions=source, rotations=rotations)
-    frames = find_wrong_frames(seen, reference, same_frame=same_frame, seed=seed)
-    found = causes(frames)
+    if wrong_frame.NAME not in names_of(asked.effects) or asked.observe is None:
+        return _causes(asked, None)
+    every = np.arange(len(asked.ids), dtype=np.intp)
+    seen = replace(asked.observe(every), positions=asked.source, rotations=asked.rotations)
+    frames = find_wrong_frames(seen, asked.reference, same_frame=asked.same_frame, seed=asked.seed)
+    found = _causes(asked, frames)
     # what other effects hide may be a listed frame as well, and beside them it is known better
     beside = _beside(found, frames.terms)
     if beside is None:
         return replace(found, frames=frames)
-    repaired = reference[found.exchanged.permutation]
-    again = find_wrong_frames(seen, repaired, same_frame=same_frame, seed=seed, beside=beside)
+    repaired = asked.reference[found.exchanged.permutation]
+    again = find_wrong_frames(seen, repaired, same_frame=asked.same_frame, seed=asked.seed, beside=beside)
     if {term.label for term in again.terms} != {term.label for term in frames.terms}:
-        found = causes(again)
+        found = _causes(asked, again)
     return replace(found, frames=again)
 
 
@@ -196,101 +181,84 @@ def _beside(found: Causes, frames: Sequence[Term]) -> Array | None:
     return wrong_frame.turned_back(seen, frames, places - seen.positions)
 
 
-def _causes(
-    ids: Sequence[str],
-    source: Array,
-    reference: Array,
-    rotations: Rotation | None,
-    effects: Effects,
-    observe: Observe | None,
-    frames: FrameSearch | None,
-    *,
-    kind: str,
-    noise: float | None,
-    seed: int,
-    reference_rotations: Rotation | None,
-    written: Written,
-    nested: bool,
-    progress: Callable[[], None],
-) -> Causes:
-    """As `find_causes`, with the spots where proved frames put them."""
-    as_given = rotations
-    if frames is not None:
-        source, rotations = frames.observations.positions, frames.observations.rotations
-    looked_for = names_of(effects)
-    simple: Effects = "auto" if effects == "auto" else tuple(name for name in looked_for if name in EFFECTS)
-    exchanged, trial = search_effects(ids, source, reference, rotations, simple, kind=kind, noise=noise, seed=seed)
+def _causes(asked: Question, frames: FrameSearch | None) -> Causes:
+    """Names, convention, tool and all other effects, with the spots where proved frames put them."""
+    as_given = asked.rotations
+    framed = frames.observations if frames is not None and frames.terms else None
+    if framed is not None:
+        asked = replace(asked, source=framed.positions, rotations=framed.rotations)
+    looked_for = names_of(asked.effects)
+    exchanged, trial = _simple(asked)
     reading = None
-    if convention.NAME in looked_for and rotations is not None:
-        reading = _reading(source, reference, rotations, reference_rotations, exchanged, written, kind, seed)
-        found_reading = None if reading is None else reading.finding
-        if found_reading is not None and found_reading.side == "source" and found_reading.effect.named:
-            rotations = reread(rotations, found_reading.reading)
-            exchanged, trial = search_effects(
-                ids, source, reference, rotations, simple, kind=kind, noise=noise, seed=seed
-            )
+    if convention.NAME in looked_for and asked.rotations is not None:
+        reading = _reading(asked, asked.rotations, exchanged)
+        finding = None if reading is None else reading.finding
+        if finding is not None and finding.side == "source" and finding.effect.named:
+            asked = replace(asked, rotations=reread(asked.rotations, finding.reading))
+            exchanged, trial = _simple(asked)
     others = frozenset(name for name in looked_for if name in MECHANISMS and name != wrong_frame.NAME)
-    if frames is None and (others <= {tool_offset.NAME} or len(ids) < LEAST_SPOTS):
-        return Causes(exchanged, trial, rotations=rotations, convention=reading)
-
-    def look(names: ExchangeResult) -> tuple[Discovery, Observations]:
-        seen = Observations(source, rotations)
-        if observe is not None:
-            seen = replace(observe(names.permutation), positions=source, rotations=rotations)
-        if frames is not None:
-            joints, measured = frames.observations.joints, frames.observations.measured_joints
-            seen = replace(seen, joints=joints, measured_joints=None if joints is None else measured)
-        repaired = reference[names.permutation]
-        start = names.robust.inliers
-        found = discover(
-            seen,
-            repaired,
-            inliers=start,
-            noise=noise,
-            seed=seed,
-            effects=others,
-            nested=nested,
-            progress=progress,
-        )
-        return found, seen
-
-    found, seen = look(exchanged)
+    if framed is None and (others <= {tool_offset.NAME} or len(asked.ids) < LEAST_SPOTS):
+        return Causes(exchanged, trial, rotations=asked.rotations, convention=reading)
+    found, seen = _discovered(asked, exchanged, others, framed)
     if found.accepted and swapped_ids.NAME in looked_for:
-        again = find_exchanged(ids, found.fit.moved, reference, seed=seed)
+        again = find_exchanged(asked.ids, found.fit.moved, asked.reference, seed=asked.seed)
         if not np.array_equal(again.permutation, exchanged.permutation):
             exchanged = again
-            found, seen = look(exchanged)
-    if frames is not None:
+            found, seen = _discovered(asked, exchanged, others, framed)
+    if frames is not None and framed is not None:
         none = (np.zeros(0),) * len(frames.terms)
         fit = replace(found.fit, terms=(*frames.terms, *found.fit.terms), values=(*none, *found.fit.values))
         trial = None if trial is None else replace(trial, accepted=False, effect=None, verdict=_WITH_FRAMES)
         return Causes(exchanged, trial, replace(found, fit=fit), seen, as_given, reading, frames)
-    settled = _settled(ids, source, reference, exchanged, trial, found, looked_for, seed)
-    return Causes(*settled, found, seen, rotations, reading)
+    return Causes(*_settled(asked, exchanged, trial, found), found, seen, asked.rotations, reading)
 
 
-def _reading(
-    source: Array,
-    reference: Array,
-    rotations: Rotation,
-    reference_rotations: Rotation | None,
-    exchanged: ExchangeResult,
-    written: Written,
-    kind: str,
-    seed: int,
-) -> ConventionTrial | None:
+def _simple(asked: Question) -> tuple[ExchangeResult, ToolTrial | None]:
+    """Names and the tool by itself."""
+    names = names_of(asked.effects)
+    simple: Effects = "auto" if asked.effects == "auto" else tuple(name for name in names if name in EFFECTS)
+    spots = (asked.ids, asked.source, asked.reference, asked.rotations)
+    return search_effects(*spots, simple, kind=asked.kind, noise=asked.noise, seed=asked.seed)
+
+
+def _discovered(
+    asked: Question, names: ExchangeResult, effects: frozenset[str], framed: Observations | None
+) -> tuple[Discovery, Observations]:
+    """All other effects under some names, and what was known of the spots."""
+    seen = Observations(asked.source, asked.rotations)
+    if asked.observe is not None:
+        seen = replace(asked.observe(names.permutation), positions=asked.source, rotations=asked.rotations)
+    if framed is not None:
+        measured = None if framed.joints is None else framed.measured_joints
+        seen = replace(seen, joints=framed.joints, measured_joints=measured)
+    found = discover(
+        seen,
+        asked.reference[names.permutation],
+        inliers=names.robust.inliers,
+        noise=asked.noise,
+        seed=asked.seed,
+        effects=effects,
+        nested=asked.nested,
+        progress=asked.progress,
+    )
+    return found, seen
+
+
+def _reading(asked: Question, rotations: Rotation, exchanged: ExchangeResult) -> ConventionTrial | None:
     """Whether a list writes its orientations in another way; None where neither list can tell."""
-    rows = np.flatnonzero(exchanged.robust.inliers)
-    if reference_rotations is None:
+    rows, written, others = np.flatnonzero(exchanged.robust.inliers), asked.written, asked.reference_rotations
+    if others is None:
         if written.source is None:  # programs are read by their language: there is no other way
             return None
-        repaired = reference[exchanged.permutation]
-        return investigate_by_tool(source, rotations, repaired, seed=seed, kind=kind, columns=written.source)
+        repaired = asked.reference[exchanged.permutation]
+        return investigate_by_tool(
+            asked.source, rotations, repaired, seed=asked.seed, kind=asked.kind, columns=written.source
+        )
     return investigate_convention(
         rotations[rows],
-        reference_rotations[exchanged.permutation][rows],
+        others[exchanged.permutation][rows],
         registration=exchanged.robust.rigid.rotation if exchanged.robust.rigid.rank > 1 else None,
-        kind=kind,
+        kind=asked.kind,
         source_columns=written.source or "abc",
         reference_columns=written.reference or "abc",
         sides=("reference",) if written.source is None else ("source", "reference"),
@@ -298,14 +266,7 @@ def _reading(
 
 
 def _settled(
-    ids: Sequence[str],
-    source: Array,
-    reference: Array,
-    exchanged: ExchangeResult,
-    trial: ToolTrial | None,
-    found: Discovery,
-    looked_for: Sequence[str],
-    seed: int,
+    asked: Question, exchanged: ExchangeResult, trial: ToolTrial | None, found: Discovery
 ) -> tuple[ExchangeResult, ToolTrial | None]:
     """Names and the tool's own trial, with what discovery says of the tool."""
     accepted = [each.term.effect for each in found.accepted]
@@ -325,7 +286,7 @@ def _settled(
     trial = replace(trial, accepted=False, effect=None, verdict=verdict)
     if accepted:
         return exchanged, trial
-    if swapped_ids.NAME in looked_for:
-        return find_exchanged(ids, source, reference, seed=seed), trial
-    keep = np.arange(len(ids), dtype=np.intp)
-    return ExchangeResult((), keep, fit_robust(source, reference, seed=seed)), trial
+    if swapped_ids.NAME in names_of(asked.effects):
+        return find_exchanged(asked.ids, asked.source, asked.reference, seed=asked.seed), trial
+    keep = np.arange(len(asked.ids), dtype=np.intp)
+    return ExchangeResult((), keep, fit_robust(asked.source, asked.reference, seed=asked.seed)), trial

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from respot.calibration.calibration import Calibration, Frame, Kind
-from respot.calibration.causes import Causes, Observe, Written, find_causes
+from respot.calibration.causes import Causes, Observe, Question, Written, find_causes
 from respot.calibration.discovery.records import effects_of as discovered_effects
 from respot.calibration.effects import group_shift, swapped_ids, tool_offset
 from respot.calibration.effects.effect import Effect
@@ -240,22 +240,23 @@ def _fit(pairs: Pairs, asked: Asked) -> SpotFit:
     """Fit pairs by the method that was asked for."""
     _check(pairs.ids, pairs.source, pairs.reference)
     _require_sense(pairs, asked)
-    causes = find_causes(
-        pairs.ids,
-        pairs.source,
-        pairs.reference,
-        pairs.source_rotations,
-        asked.effects,
-        pairs.observe,
+    question = Question(
+        ids=pairs.ids,
+        source=pairs.source,
+        reference=pairs.reference,
+        rotations=pairs.source_rotations,
+        effects=asked.effects,
         kind=asked.kind,
         noise=asked.noise,
         seed=asked.seed,
+        observe=pairs.observe,
         reference_rotations=pairs.reference_rotations,
-        written=asked.written,
+        written=asked.written or Written(),
         nested=asked.nested,
         progress=asked.progress,
         same_frame=asked.same_frame,
     )
+    causes = find_causes(question)
     repaired = pairs.reference[causes.exchanged.permutation]
     turned = _read_again(pairs, causes)
     if asked.orientations == "fit":

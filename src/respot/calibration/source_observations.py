@@ -27,14 +27,13 @@ from respot.program.targets import Target, TargetKind
 from respot.spots import Source
 from respot.tables import Table
 from respot.tables.columns import ANGLES, EXTERNAL, POSITION, QUATERNION
+from respot.tolerance import AXIS_MOVES_DEG
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 #: Poses and joints of a table belong together where one tool explains all of them to this.
 _SAME_TOOL_MM, _SAME_TOOL_DEG = 1.0, 0.5
-#: An axis that moves less than this between two targets does not move [deg].
-_MOVES_DEG = 0.02
 _JOINT_FIELDS = {"krl": tuple(f"A{n}" for n in range(1, 7)), "rapid": tuple(f"rax_{n}" for n in range(1, 7))}
 
 
@@ -312,7 +311,7 @@ def _approach(cell: RobotCell, robot: Robot, moves: Sequence[Move], joints: Arra
             start[number] = _joint_position(robot.language, move.target)
     way = joints[rows] - start
     # an axis that hardly moves keeps its side, which the path alone does not tell
-    signs[rows] = np.where(np.abs(way) > _MOVES_DEG, np.sign(way), np.nan)
+    signs[rows] = np.where(np.abs(way) > AXIS_MOVES_DEG, np.sign(way), np.nan)
     return signs
 
 

@@ -16,9 +16,7 @@ from respot.kinematics.opw import OpwRobot
 from respot.languages import Language
 from respot.program.moves import Move
 from respot.program.robot import Robot, Routine
-
-#: An axis that moves less than this between two targets does not move: it keeps the side that it came from [deg].
-MOVES_DEG = 0.02
+from respot.tolerance import AXIS_MOVES_DEG
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +98,7 @@ def sides_of(joints: Array) -> Array:
     """
     way = np.vstack([np.full((1, joints.shape[1]), np.nan), np.diff(joints, axis=0)])
     told = np.where(np.isnan(way), np.nan, np.sign(way))
-    events = np.isnan(way) | (np.abs(way) > MOVES_DEG)
+    events = np.isnan(way) | (np.abs(way) > AXIS_MOVES_DEG)
     last = np.maximum.accumulate(np.where(events, np.arange(len(joints))[:, None], 0), axis=0)
     return np.asarray(np.take_along_axis(told, last, axis=0))
 
