@@ -13,9 +13,15 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from respot.tolerance import LOCK_TURN_DEG
+
 Array = npt.NDArray[np.float64]
 
 IDENTITY = RigidTransform.identity()
+
+_HALF_TURN = 180.0
+#: B up to here is far from the lock, and no other triple is nearer than one whose angles all differ by less than this.
+_NO_LOCK, _NO_OTHER = 89.0, 60.0
 
 
 def rotation_from_abc(abc: npt.ArrayLike) -> Rotation:
@@ -23,14 +29,67 @@ def rotation_from_abc(abc: npt.ArrayLike) -> Rotation:
     return Rotation.from_euler("ZYX", np.asarray(abc, dtype=float), degrees=True)
 
 
-def abc_from_rotation(rotation: Rotation) -> Array:
-    """KUKA angles of a rotation, shape (3,) or (n, 3), degrees, A and C in [-180, 180], B in [-90, 90].
+def abc_from_rotation(rotation: Rotation, near: npt.ArrayLike | None = None) -> Array:
+    """KUKA angles of a rotation, shape (3,) or (n, 3), degrees.
 
-    At B = +-90 only A -+ C is defined; C is 0 then.
+    Parameters
+    ----------
+    rotation : Rotation
+        One rotation or a batch.
+    near : array_like, optional
+        Old angles of the same shape. (A, B, C) and (A + 180, 180 - B, C + 180) are the same rotation, and at B = +-90
+        only A -+ C counts: of all such triples the one nearest to the old one is taken. An angle stays in
+        [-180, 180], unless the old one was outside: then it may be as well.
+
+    Returns
+    -------
+    ndarray
+        Without ``near`` A and C in [-180, 180], B in [-90, 90], and C is 0 at B = +-90.
     """
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Gimbal lock detected", category=UserWarning)
-        return np.asarray(rotation.as_euler("ZYX", degrees=True))
+        abc = np.asarray(rotation.as_euler("ZYX", degrees=True))
+    if near is None:
+        return abc
+    old = np.asarray(near, dtype=float)
+    found = _turned_near(abc, old)
+    if np.abs(abc[..., 1]).max(initial=0.0) > _NO_LOCK or np.abs(found - old).max(initial=0.0) > _NO_OTHER:
+        found = _nearest_abc(rotation, old)
+    return np.where((np.abs(found) > _HALF_TURN) & (np.abs(old) <= _HALF_TURN), _turned_near(found, 0.0), found)
+
+
+def _turned_near(angles: Array, near: Array | float) -> Array:
+    """Angles, each as many whole turns on as bring it nearest to another."""
+    return np.asarray(angles + 2.0 * _HALF_TURN * np.rint((near - angles) / (2.0 * _HALF_TURN)))
+
+
+def _nearest_abc(rotation: Rotation, near: Array) -> Array:
+    """Of all triples (..., 3) of a rotation the one nearest to ``near``."""
+    matrix = rotation.as_matrix()
+    first = np.degrees(np.arctan2(matrix[..., 1, 0], matrix[..., 0, 0]))
+    candidates = np.stack([_abc_with(matrix, a, near) for a in (first, first + _HALF_TURN)])
+    away = np.sum((candidates - near) ** 2, axis=-1, keepdims=True)
+    found = np.where(away[0] <= away[1], candidates[0], candidates[1])
+    # at the lock A may be any angle, and C follows: both share the way to the old ones
+    followed = _abc_with(matrix, near[..., 0], near)
+    half = 0.5 * np.sign(followed[..., 1]) * (near[..., 2] - followed[..., 2])
+    shared = _abc_with(matrix, near[..., 0] + half, near)
+    lost = np.degrees((rotation.inv() * rotation_from_abc(shared)).magnitude())
+    return np.where((lost <= LOCK_TURN_DEG)[..., None], shared, found)
+
+
+def _abc_with(matrix: Array, a: Array, near: Array) -> Array:
+    """Angles (..., 3) of rotation matrices for a given A, each as many whole turns on as brings it nearest to ``near``.
+
+    B and C make good what A leaves of the rotation: for an A of the rotation exactly, at the lock for any A.
+    """
+    sine, cosine = np.sin(np.radians(a)), np.cos(np.radians(a))
+    column = [matrix[..., row, 0] for row in range(3)]
+    b = np.arctan2(-column[2], cosine * column[0] + sine * column[1])
+    c = np.arctan2(
+        sine * matrix[..., 0, 2] - cosine * matrix[..., 1, 2], cosine * matrix[..., 1, 1] - sine * matrix[..., 0, 1]
+    )
+    return _turned_near(np.stack([a, np.degrees(b), np.degrees(c)], axis=-1), near)
 
 
 def rotation_from_quaternion(quaternion: npt.ArrayLike) -> Rotation:
@@ -46,14 +105,16 @@ def quaternion_from_rotation(rotation: Rotation, near: npt.ArrayLike | None = No
     rotation : Rotation
         One rotation or a batch.
     near : array_like, optional
-        Old quaternions of the same shape: q and -q are the same rotation, the sign that is nearer to the old one is
-        taken. Without it q1 >= 0.
+        Old quaternions of the same shape, none all zero: q and -q are the same rotation, the sign that is nearer to
+        the old one is taken. The length stays what it was too, so that turning back gives the old numbers. Without
+        it q1 >= 0 and the length is 1.
     """
     quaternion = np.asarray(rotation.as_quat(canonical=True, scalar_first=True))
     if near is None:
         return quaternion
-    sign = np.where(np.sum(quaternion * np.asarray(near, dtype=float), axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
-    return np.asarray(quaternion * sign)
+    old = np.asarray(near, dtype=float)
+    sign = np.where(np.sum(quaternion * old, axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
+    return np.asarray(quaternion * sign * np.linalg.norm(old, axis=-1, keepdims=True))
 
 
 def pose(position: npt.ArrayLike, rotation: Rotation) -> RigidTransform:

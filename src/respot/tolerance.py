@@ -17,6 +17,13 @@ MOST_DECIMALS = 12
 SAME_POSITION_MM = 1e-9
 SAME_ROTATION_DEG = 1e-9
 
+#: Where A, B, C lock (B = +-90), A and C may go where they like if that turns the pose by no more than this: half the
+#: last digit that is printed there.
+LOCK_TURN_DEG = 5e-7
+#: Cosine of B below which A, B, C get one decimal more, and one more again. Digits lost are lost in the rotation; going
+#: back makes them larger by 1 / cos B in A and C, and must not change the last digit of a number by more than one.
+STEEP = (0.75, 0.075)
+
 #: A target under another name, used in the same way, is the same target up to this distance.
 RENAMED_WITHIN_MM = 10.0
 

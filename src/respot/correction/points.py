@@ -79,9 +79,9 @@ def new_pose(moving: Moving, source2reference: RigidTransform) -> RigidTransform
 def printed_pose(target: Target, after: RigidTransform, text: str, language: Language) -> RigidTransform:
     """Pose that the robot reads once ``after`` is written with the digits that the literal gets."""
     values = language.pose_values(target, after)
-    read = {}
+    decimals, read = language.decimals(target), {}
     for name, value in values.items():
-        style = NumberStyle.of(text[slice(*target.numbers[name].span)]).at_least(language.decimals[name])
+        style = NumberStyle.of(text[slice(*target.numbers[name].span)]).at_least(decimals[name])
         read[name] = float(spell(value, style))
     numbers = list(read.values())
     if len(numbers) not in (6, 7):
@@ -116,7 +116,7 @@ def point_edit(
     target = moving.target
     assert target.pose is not None  # noqa: S101
     values = {**language.pose_values(target, after), **configuration}
-    changes = changes_of(text, target.numbers, values, language.decimals)
+    changes = changes_of(text, target.numbers, values, language.decimals(target))
     if not changes:
         return None
     replacement = templates.literal(text, target.span, changes)

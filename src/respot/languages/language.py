@@ -45,8 +45,8 @@ class Language:
         moves one.
     pose_values : callable
         Fields of a target for a new pose in its base.
-    decimals : mapping of str to int
-        Decimals that a changed field gets at least; ``offset`` fields follow the first length.
+    decimals : callable
+        ``decimals(target)``: how many decimals each field of a target gets at least when it changes.
     has_configuration : callable
         Whether a target carries status and turn or confdata.
     header_place : callable
@@ -66,7 +66,7 @@ class Language:
     forms: Forms
     read_robots: Callable[[str, str, Mapping[str, bytes], Forms], list[Robot]]
     pose_values: Callable[[Target, RigidTransform], dict[str, float]]
-    decimals: Mapping[str, int]
+    decimals: Callable[[Target], Mapping[str, int]]
     has_configuration: Callable[[Target], bool]
     header_place: Callable[[ProgramFile], Span | None]
     configuration_fields: Sequence[str]

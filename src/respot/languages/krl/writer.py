@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from math import cos, radians
+
 from scipy.spatial.transform import RigidTransform
 
 from respot.geometry import abc_from_rotation
@@ -9,17 +12,23 @@ from respot.languages.writing import header_span
 from respot.program.robot import ProgramFile
 from respot.program.targets import Target
 from respot.source import Span
-from respot.tolerance import ANGLE_DECIMALS, LENGTH_DECIMALS
+from respot.tolerance import ANGLE_DECIMALS, LENGTH_DECIMALS, STEEP
 
-_LENGTHS = dict.fromkeys("XYZ", LENGTH_DECIMALS)
-_ANGLES = dict.fromkeys("ABC", ANGLE_DECIMALS)
-DECIMALS = {**_LENGTHS, **_ANGLES, "S": 0, "T": 0}
+_OTHERS = {**dict.fromkeys("XYZ", LENGTH_DECIMALS), "S": 0, "T": 0}
+#: By how many decimals the angles get more where B is steep.
+_DECIMALS = [{**_OTHERS, **dict.fromkeys("ABC", ANGLE_DECIMALS + more)} for more in range(len(STEEP) + 1)]
 _HEADS = ("routine", "function", "data_list")
 
 
+def decimals(target: Target) -> Mapping[str, int]:
+    """Decimals that each field gets at least when it changes."""
+    cosine = abs(cos(radians(target.components[4]))) if target.components else 1.0
+    return _DECIMALS[sum(cosine < limit for limit in STEEP)]
+
+
 def pose_values(target: Target, pose: RigidTransform) -> dict[str, float]:
-    """New values of a target's fields, for ``pose`` in its base: X, Y, Z in mm, A, B, C in degrees."""
-    values = [*pose.translation, *abc_from_rotation(pose.rotation)]
+    """New values of a target's fields, for ``pose`` in its base: X, Y, Z in mm, A, B, C in degrees near the old."""
+    values = [*pose.translation, *abc_from_rotation(pose.rotation, near=target.components[3:] or None)]
     return {name: float(value) for name, value in zip("XYZABC", values, strict=True) if name in target.numbers}
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from scipy.spatial.transform import RigidTransform
 
 from respot.geometry import quaternion_from_rotation
@@ -13,11 +15,16 @@ from respot.tolerance import LENGTH_DECIMALS, QUATERNION_DECIMALS
 
 _POSITION = ("x", "y", "z")
 _QUATERNION = ("q1", "q2", "q3", "q4")
-DECIMALS = {
+_DECIMALS: Mapping[str, int] = {
     **dict.fromkeys(_POSITION, LENGTH_DECIMALS),
     **dict.fromkeys(_QUATERNION, QUATERNION_DECIMALS),
     **dict.fromkeys(("cf1", "cf4", "cf6", "cfx"), 0),
 }
+
+
+def decimals(target: Target) -> Mapping[str, int]:  # noqa: ARG001 - the same of every target
+    """Decimals that each field gets at least when it changes."""
+    return _DECIMALS
 
 
 def pose_values(target: Target, pose: RigidTransform) -> dict[str, float]:
