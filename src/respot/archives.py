@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import lzma
 import os
+import re
 import struct
 import unicodedata
 import zipfile
@@ -33,6 +34,8 @@ _FOREIGN = (
     OSError, zipfile.BadZipFile, zipfile.LargeZipFile, RuntimeError, NotImplementedError, zlib.error, lzma.LZMAError,
     EOFError, ValueError, OverflowError, struct.error, IndexError, MemoryError,
 )  # fmt: skip
+#: Folders of ``respot.output``: originals that undo needs, and what is being written. They are no part of a backup.
+_OWN_FOLDER = re.compile(r"\.(.+\.)?respot")
 _LOCAL_HEADER = struct.Struct("<4s22xHH")
 _UNICODE_PATH = 0x7075
 
@@ -73,7 +76,7 @@ def read_tree(path: Path) -> Tree:
     """
     try:
         if path.is_dir():
-            return _with_issues(path, _read_folder(path), [])
+            return _with_issues(path, *_read_folder(path))
         if path.is_file():
             if zipfile.is_zipfile(path):
                 return _with_issues(path, *_read_zip(path))
@@ -83,13 +86,32 @@ def read_tree(path: Path) -> Tree:
             return Tree(_read_file(path), single=True)
     except _FOREIGN as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error) or "is damaged"
-        raise BadInputError("CANNOT_READ", reason, str(path)) from error
+        named = error.filename if isinstance(error, OSError) and isinstance(error.filename, str) else path
+        raise BadInputError("CANNOT_READ", reason, str(named)) from error
+    if (workplace_of(path) / "old").is_dir():
+        message = f"was moved away by a run of respot that was cut short; to put it back: respot undo {path}"
+        raise BadInputError("CANNOT_READ", message, str(path))
     raise BadInputError("CANNOT_READ", "no such file or folder", str(path))
 
 
 def read_files(path: Path) -> dict[str, bytes]:
     """Return the files of a source by path, as `read_tree` reads them."""
     return read_tree(path).files
+
+
+def is_own_folder(name: str) -> bool:
+    """Whether a folder of this name holds originals or work of respot, and no part of a backup."""
+    return _OWN_FOLDER.fullmatch(name) is not None
+
+
+def is_own(path: str) -> bool:
+    """Whether a file of a backup, by its path with ``/``, lies in a folder of respot."""
+    return any(is_own_folder(part) for part in path.split("/")[:-1])
+
+
+def workplace_of(folder: Path) -> Path:
+    """Hidden folder of respot beside a folder that it writes."""
+    return folder.parent / f".{folder.name}.respot"
 
 
 def _with_issues(path: Path, files: dict[str, bytes], issues: list[Issue]) -> Tree:
@@ -105,10 +127,11 @@ def _with_issues(path: Path, files: dict[str, bytes], issues: list[Issue]) -> Tr
 # -------------------------------------------------------------------------------------------------------------- folders
 
 
-def _read_folder(path: Path) -> dict[str, bytes]:
+def _read_folder(path: Path) -> tuple[dict[str, bytes], list[Issue]]:
     found: list[Path] = []
+    own: list[Path] = []
     size = 0
-    for file in _below(path):
+    for file in _below(path, own):
         if file.is_symlink():
             raise BadInputError("UNSAFE_ARCHIVE", "is a link; copy the backup without links", str(file))
         if file.is_file():
@@ -117,17 +140,29 @@ def _read_folder(path: Path) -> dict[str, bytes]:
         elif not file.is_dir():
             raise BadInputError("UNSAFE_ARCHIVE", "is neither file nor folder; copy the backup without it", str(file))
     _check_size(path, len(found), size)
-    return {file.relative_to(path).as_posix(): file.read_bytes() for file in found}
+    files = {file.relative_to(path).as_posix(): file.read_bytes() for file in found}
+    return files, [_own_issue(str(folder)) for folder in own]
 
 
-def _below(path: Path) -> list[Path]:
-    """Everything below a folder, sorted; a folder that may not be listed is an error, never an empty one."""
+def _own_issue(place: str) -> Issue:
+    return Issue("OWN_FOLDER", "is a folder of respot itself, with what undo needs; it is not read", place)
+
+
+def _below(path: Path, own: list[Path]) -> list[Path]:
+    """Everything below a folder, sorted; a folder that may not be listed is an error, never an empty one.
+
+    Folders of respot are left out and added to ``own``.
+    """
 
     def refuse(error: OSError) -> None:
         raise BadInputError("CANNOT_READ", error.strerror or str(error), str(error.filename)) from error
 
-    walk = os.walk(path, onerror=refuse)
-    return sorted(Path(folder, name) for folder, folders, files in walk for name in (*folders, *files))
+    found: list[Path] = []
+    for here, folders, files in os.walk(path, onerror=refuse):
+        own += [Path(here, name) for name in folders if is_own_folder(name)]
+        folders[:] = [name for name in folders if not is_own_folder(name)]
+        found += [Path(here, name) for name in (*folders, *files)]
+    return sorted(found)
 
 
 def _read_file(path: Path) -> dict[str, bytes]:
@@ -153,6 +188,7 @@ def _check_size(path: Path, count: int, size: int) -> None:
 
 def _read_zip(path: Path) -> tuple[dict[str, bytes], list[Issue]]:
     files: dict[str, bytes] = {}
+    own: list[str] = []
     with zipfile.ZipFile(path) as archive, path.open("rb") as stream:
         entries = archive.infolist()
         size = sum(entry.file_size for entry in entries)
@@ -168,7 +204,11 @@ def _read_zip(path: Path) -> tuple[dict[str, bytes], list[Issue]]:
                 continue
             if name in files:
                 raise BadInputError("UNSAFE_ARCHIVE", f"holds {name} twice", str(path))
-            files[name] = _unpack(archive, entry, name, path)
+            if is_own(name):
+                own.append(name)
+            else:
+                files[name] = _unpack(archive, entry, name, path)
+        issues += [_own_issue(f"{path}:{own[0]}")] if own else []
     return files, issues
 
 

@@ -48,6 +48,17 @@ CODES: dict[str, tuple[Level, str]] = {
     "BAD_CALIBRATION": (_E, "a calibration file cannot be used"),
     "BAD_OPTION": (_E, "an option or a combination of options makes no sense"),
     "OUTPUT_EXISTS": (_E, "the output folder exists and is not empty"),
+    "CANNOT_WRITE": (_E, "a file or folder cannot be written"),
+    "IN_USE": (_E, "another run of respot writes the same folder"),
+    "SOURCE_CHANGED": (_E, "a file changed between reading it and writing its successor"),
+    "OWN_FOLDER": (_I, "a hidden folder in which respot keeps what undo needs; it is no part of the backup"),
+    "BAD_TEMPLATE": (_E, "a plant's template cannot be used, or does not write what is intended"),
+    # taking back
+    "NOTHING_TO_UNDO": (_E, "a folder holds no conversion that could be taken back"),
+    "CHANGED_SINCE": (_E, "a file was changed after respot wrote it"),
+    "ORIGINALS_LOST": (_E, "an original that undo needs is missing or damaged"),
+    "STAYS_CHANGED": (_W, "a file that the conversion did not write was changed since; it stays as it is"),
+    "SET_ASIDE": (_W, "a changed file was set aside for its original to come back"),
     # matching and fitting
     "NO_COMMON_IDS": (_E, "source and reference share no spot ID"),
     "TOO_FEW_PAIRS": (_E, "fewer than four spots are matched"),

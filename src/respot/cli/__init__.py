@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from respot import __version__
-from respot.cli import check, convert, demo, diff, fit, inspect, predict, robots, simulate, validate
+from respot.cli import check, convert, demo, diff, fit, inspect, predict, robots, simulate, undo, validate
 
 app = typer.Typer(
     name="respot",
@@ -26,6 +26,7 @@ _COMMANDS = {
     "predict": predict,
     "validate": validate,
     "convert": convert,
+    "undo": undo,
     "diff": diff,
     "check": check,
     "robots": robots,

@@ -97,6 +97,12 @@ def run(
     templates: Annotated[
         Path | None, typer.Option("--templates", help="Folder of templates laid over ours.", show_default=False)
     ] = None,
+    in_place: Annotated[
+        bool,
+        typer.Option(
+            "--in-place", help="Change the backup's own folder; it keeps the originals, `respot undo` restores them."
+        ),
+    ] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Do everything but write.")] = False,
     tolerance: options.Tolerance = 10.0,
     seed: options.Seed = 0,
@@ -165,7 +171,9 @@ def run(
             if measured:
                 fit_options = replace(fit_options, robot=model)
         fit_options = replace(fit_options, profiles=tuple(profile or ()), effects=looked_for)
-        return convert_to(source, reference, calibration, fit_options, chosen, output, dry_run, force, tolerance)
+        return convert_to(
+            source, reference, calibration, fit_options, chosen, output, dry_run, force, tolerance, in_place
+        )
 
     run_command(work, as_json, strict)
 
@@ -180,29 +188,44 @@ def convert_to(
     dry_run: bool,
     force: bool,
     tolerance: float,
+    in_place: bool = False,
 ) -> Outcome:
     """Convert and write, unless it is a dry run."""
     from respot.cli.show_convert import show_conversion
     from respot.correction.conversion import convert, record_of
-    from respot.output import check_output, rehearse, write_backup
+    from respot.output import check_in_place, check_output, rehearse, write_backup, write_in_place
 
-    if output is None and not dry_run:
-        raise BadInputError("BAD_OPTION", "give the new folder with -o OUTDIR, or --dry-run")
+    if output is not None and in_place:
+        raise BadInputError("BAD_OPTION", "give a new folder with -o OUTDIR, or --in-place, not both")
+    if output is None and not in_place and not dry_run:
+        message = "give the new folder with -o OUTDIR; or --in-place to change the backup itself, or --dry-run"
+        raise BadInputError("BAD_OPTION", message)
+    if in_place:
+        check_in_place(source)
     if output is not None:
         check_output(
             output, force, [path for path in (source, reference, calibration, chosen.covariates) if path is not None]
         )
     conversion = convert(source, reference, calibration, fit_options, chosen)
-    if dry_run or output is None:
-        rehearse(conversion.files, conversion.correction)
-    else:
-        write_backup(output, conversion.files, conversion.correction, record_of(conversion), force)
+    files, correction = conversion.files, conversion.correction
     written = None if dry_run else output
-    data = {**conversion.as_json(), "verified": True, "output": None if written is None else str(written)}
+    if written is not None:
+        write_backup(written, files, correction, record_of(conversion), force)
+    elif in_place and not dry_run and correction.files and conversion.source.backup is not None:
+        written = source
+        write_in_place(source, conversion.source.backup.files, files, correction, record_of(conversion))
+    else:
+        rehearse(files, correction)
+    data = {
+        **conversion.as_json(),
+        "verified": True,
+        "output": None if written is None else str(written),
+        "in_place": in_place and written is not None,
+    }
     return Outcome(
         "convert",
         data,
-        lambda: show_conversion(conversion, tolerance, written),
+        lambda: show_conversion(conversion, tolerance, written, in_place),
         list(conversion.issues),
         answer_is_no=bool(conversion.correction.refused),
     )

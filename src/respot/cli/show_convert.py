@@ -15,12 +15,13 @@ if TYPE_CHECKING:
     from respot.correction.conversion import Conversion
 
 
-def show_conversion(conversion: Conversion, tolerance: float, written: Path | None) -> None:
+def show_conversion(conversion: Conversion, tolerance: float, written: Path | None, in_place: bool = False) -> None:
     """Print a conversion: the fit, what moved, what stays, what was refused, where it is."""
     if conversion.fitted is not None:
         show_fit(conversion.fitted, report(conversion.fitted.fit), tolerance)
     correction = conversion.correction
-    heading(f"{describe(conversion.source)}: {'written' if written else 'nothing written (dry run)'}")
+    nothing = "no file changes, nothing written" if in_place and not correction.files else "nothing written (dry run)"
+    heading(f"{describe(conversion.source)}: {'written' if written else nothing}")
     _show_moved(conversion)
     for code in dict.fromkeys(stay.code for stay in correction.stays):
         names = [stay.target.name for stay in correction.stays if stay.code == code]
@@ -37,7 +38,8 @@ def show_conversion(conversion: Conversion, tolerance: float, written: Path | No
         line("  for the real cell: the simulation must not load these files")
     _show_effects(conversion.image.record())
     if written is not None:
-        line(f"  in {written} (record: {written / 'respot.json'})")
+        where = f"in place; the originals come back with: respot undo {written}" if in_place else f"in {written}"
+        line(f"  {where} (record: {written / 'respot.json'})")
 
 
 def _show_effects(record: Mapping[str, Any]) -> None:
