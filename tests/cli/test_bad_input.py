@@ -155,25 +155,6 @@ def test_a_file_name_that_is_no_utf_8(respot, tmp_path, theory):
     assert os.path.exists(copied)  # noqa: PTH110
 
 
-@pytest.mark.parametrize("moment", ["before", "after"])
-def test_an_interrupt_between_the_renames_keeps_the_old_folder(respot, tmp_path, theory, monkeypatch, moment):
-    assert respot("convert", SAMPLES / "kuka", "--theory", theory, "-o", "done").code == 0
-    replace, calls = Path.replace, []
-
-    def interrupted(path: Path, target: Path) -> Path:
-        calls.append(path)
-        if len(calls) == 1 and moment == "after":
-            replace(path, target)
-        if len(calls) == 1:
-            raise KeyboardInterrupt
-        return replace(path, target)
-
-    monkeypatch.setattr(Path, "replace", interrupted)
-    assert respot("convert", SAMPLES / "abb", "--theory", theory, "-o", "done", "--force").code == 130
-    assert (tmp_path / "done" / "KRC").is_dir()
-    assert [path.name for path in tmp_path.iterdir()] == ["done"]
-
-
 def test_fit_writes_into_no_input(respot, tmp_path, theory):
     shutil.copytree(SAMPLES / "abb", tmp_path / "abb")
     shutil.copy(theory, tmp_path / "theory.csv")
@@ -243,7 +224,6 @@ def test_spot_id_that_is_no_pattern(respot, tmp_path, theory):
 INTERRUPTED = """
 import sys, threading, _thread
 from pathlib import Path
-import respot.output as output
 wait = threading.Event()
 write = Path.write_bytes
 def slow(path, data):
