@@ -48,6 +48,40 @@ def from_abb(x, y, z, w, i, j, k) -> np.ndarray:
     return matrix(np.array(rotation), (x, y, z))
 
 
+def abc_of(rotation: np.ndarray, near: np.ndarray) -> np.ndarray:
+    """KUKA angles of a rotation matrix: of the two triples, and whole turns of each angle, those nearest to others."""
+    a = np.degrees(np.arctan2(rotation[1, 0], rotation[0, 0]))
+    b = np.degrees(np.arctan2(-rotation[2, 0], np.hypot(rotation[0, 0], rotation[1, 0])))
+    c = np.degrees(np.arctan2(rotation[2, 1], rotation[2, 2]))
+    triples = np.array([[a, b, c], [a + 180.0, 180.0 - b, c + 180.0]])
+    triples += 360.0 * np.round((near - triples) / 360.0)
+    found = min(triples, key=lambda triple: np.linalg.norm(triple - near))
+    beyond = (np.abs(found) > 180.0) & (np.abs(near) <= 180.0)
+    return np.where(beyond, found - 360.0 * np.sign(found), found)
+
+
+def quaternion_of(rotation: np.ndarray, near: np.ndarray) -> np.ndarray:
+    """ABB quaternion of a rotation matrix, with the sign and length of another: the eigenvector of the largest value."""
+    m = rotation
+    form = np.array(
+        [
+            [m[0, 0] + m[1, 1] + m[2, 2], m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]],
+            [m[2, 1] - m[1, 2], m[0, 0] - m[1, 1] - m[2, 2], m[0, 1] + m[1, 0], m[0, 2] + m[2, 0]],
+            [m[0, 2] - m[2, 0], m[0, 1] + m[1, 0], m[1, 1] - m[0, 0] - m[2, 2], m[1, 2] + m[2, 1]],
+            [m[1, 0] - m[0, 1], m[0, 2] + m[2, 0], m[1, 2] + m[2, 1], m[2, 2] - m[0, 0] - m[1, 1]],
+        ]
+    )
+    found = np.linalg.eigh(form)[1][:, -1]
+    return found * np.linalg.norm(near) * (-1.0 if found @ near < 0.0 else 1.0)
+
+
+def angle_between(first: np.ndarray, second: np.ndarray) -> float:
+    """Degrees between the rotations of two 4x4 matrices, exact for small ones too."""
+    turn = first[:3, :3].T @ second[:3, :3]
+    sine = 0.5 * np.linalg.norm([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+    return float(np.degrees(np.arctan2(sine, 0.5 * (np.trace(turn) - 1.0))))
+
+
 @dataclass(frozen=True)
 class Point:
     """A literal: its pose in its base, its base in the world, the text of its pose numbers, everything else it holds."""

@@ -16,7 +16,7 @@ from scipy.spatial.transform import RigidTransform
 from respot.correction.scope import Moving
 from respot.geometry import Array, distance_mm, rotation_from_abc, rotation_from_quaternion, turn_deg
 from respot.languages import Language
-from respot.languages.writing import Change, Templates, changes_of
+from respot.languages.writing import Change, Templates, changes_of, finest
 from respot.program.moves import BaseOffset, Move
 from respot.program.targets import Target
 from respot.source import Edit
@@ -149,11 +149,11 @@ def offset_edit(move: Move, values: Array, text: str, templates: Templates) -> P
         return None
     named = dict(zip("xyz", values, strict=True))
     numbers = {name: number for name, number in zip("xyz", offset.numbers, strict=True) if number is not None}
-    decimals = dict.fromkeys("xyz", LENGTH_DECIMALS)
+    decimals = finest(numbers.values(), LENGTH_DECIMALS)
     present = {name: float(named[name]) for name in numbers}
-    changes: list[Change] = list(changes_of(text, numbers, present, decimals))
+    changes: list[Change] = list(changes_of(text, numbers, present, dict.fromkeys("xyz", decimals)))
     missing = {name: float(value) for name, value in named.items() if name not in numbers}
-    style = NumberStyle(LENGTH_DECIMALS)
+    style = NumberStyle(decimals)
     missing = {name: value for name, value in missing.items() if abs(value) >= style.half_digit}
     if not changes and not missing:
         return None

@@ -66,7 +66,7 @@ class Language:
     forms: Forms
     read_robots: Callable[[str, str, Mapping[str, bytes], Forms], list[Robot]]
     pose_values: Callable[[Target, RigidTransform], dict[str, float]]
-    decimals: Callable[[Target], Mapping[str, int]]
+    decimals: Callable[[Target], dict[str, int]]
     has_configuration: Callable[[Target], bool]
     header_place: Callable[[ProgramFile], Span | None]
     configuration_fields: Sequence[str]

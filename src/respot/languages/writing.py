@@ -18,7 +18,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from respot.program.targets import Number
 from respot.resources import resource
 from respot.source import SourceText, Span
-from respot.tolerance import NumberStyle, spell
+from respot.tolerance import MOST_DECIMALS, NumberStyle, spell
 
 
 @dataclass(frozen=True)
@@ -167,6 +167,16 @@ def applied_calibrations(source: SourceText) -> set[str]:
 def says_compensated(source: SourceText) -> bool:
     """Whether the file's header says that its points were compensated by a measurement, and not turned back since."""
     return _COMPENSATED.search(source.text) is not None
+
+
+def finest(numbers: Iterable[Number], least: int) -> int:
+    """Decimals of numbers that change together: those of the finest, at least ``least``.
+
+    Each new number depends on all old ones. A coarse one among them would keep the others from coming back to the last
+    digit when the change is turned back.
+    """
+    own = (-int(number.value.as_tuple().exponent) for number in numbers if not number.value.is_zero())
+    return min(max(least, *own, 0), MOST_DECIMALS)
 
 
 def changes_of(

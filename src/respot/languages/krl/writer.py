@@ -2,28 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from math import cos, radians
 
 from scipy.spatial.transform import RigidTransform
 
 from respot.geometry import abc_from_rotation
-from respot.languages.writing import header_span
+from respot.languages.writing import finest, header_span
 from respot.program.robot import ProgramFile
 from respot.program.targets import Target
 from respot.source import Span
 from respot.tolerance import ANGLE_DECIMALS, LENGTH_DECIMALS, STEEP
 
-_OTHERS = {**dict.fromkeys("XYZ", LENGTH_DECIMALS), "S": 0, "T": 0}
-#: By how many decimals the angles get more where B is steep.
-_DECIMALS = [{**_OTHERS, **dict.fromkeys("ABC", ANGLE_DECIMALS + more)} for more in range(len(STEEP) + 1)]
 _HEADS = ("routine", "function", "data_list")
 
 
-def decimals(target: Target) -> Mapping[str, int]:
+def decimals(target: Target) -> dict[str, int]:
     """Decimals that each field gets at least when it changes."""
     cosine = abs(cos(radians(target.components[4]))) if target.components else 1.0
-    return _DECIMALS[sum(cosine < limit for limit in STEEP)]
+    angle = ANGLE_DECIMALS + sum(cosine < limit for limit in STEEP)
+    found = {"S": 0, "T": 0}
+    for names, least in (("XYZ", LENGTH_DECIMALS), ("ABC", angle)):
+        own = [number for name in names if (number := target.numbers.get(name)) is not None]
+        found.update(dict.fromkeys(names, finest(own, least)))
+    return found
 
 
 def pose_values(target: Target, pose: RigidTransform) -> dict[str, float]:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from scipy.spatial.transform import RigidTransform
 
 from respot.geometry import quaternion_from_rotation
-from respot.languages.writing import header_span
+from respot.languages.writing import finest, header_span
 from respot.program.robot import ProgramFile
 from respot.program.targets import Target
 from respot.source import Span
@@ -15,16 +13,16 @@ from respot.tolerance import LENGTH_DECIMALS, QUATERNION_DECIMALS
 
 _POSITION = ("x", "y", "z")
 _QUATERNION = ("q1", "q2", "q3", "q4")
-_DECIMALS: Mapping[str, int] = {
-    **dict.fromkeys(_POSITION, LENGTH_DECIMALS),
-    **dict.fromkeys(_QUATERNION, QUATERNION_DECIMALS),
-    **dict.fromkeys(("cf1", "cf4", "cf6", "cfx"), 0),
-}
+_LEAST = ((_POSITION, LENGTH_DECIMALS), (_QUATERNION, QUATERNION_DECIMALS))
+_CONFIGURATION = dict.fromkeys(("cf1", "cf4", "cf6", "cfx"), 0)
 
 
-def decimals(target: Target) -> Mapping[str, int]:  # noqa: ARG001 - the same of every target
+def decimals(target: Target) -> dict[str, int]:
     """Decimals that each field gets at least when it changes."""
-    return _DECIMALS
+    found = dict(_CONFIGURATION)
+    for names, least in _LEAST:
+        found.update(dict.fromkeys(names, finest([target.numbers[name] for name in names], least)))
+    return found
 
 
 def pose_values(target: Target, pose: RigidTransform) -> dict[str, float]:
