@@ -116,7 +116,9 @@ def _pairs(path: str, before: Reading, after: Reading, found: Findings) -> Itera
     return zip(first, second, strict=True)
 
 
-def _judge_rest(path: str, before: Reading, after: Reading, pairs: list[tuple[Literal, Literal]], found: Findings) -> None:
+def _judge_rest(
+    path: str, before: Reading, after: Reading, pairs: list[tuple[Literal, Literal]], found: Findings
+) -> None:
     """Outside of the numbers of literals every byte is what it was; a relative motion may get components it lacked."""
     texts = []
     for reading, side in ((before, 0), (after, 1)):
@@ -203,7 +205,11 @@ def _pose(was: Literal, now: Literal, seen: np.ndarray) -> str:
 
 
 def _judge_left_behind(
-    before: Reading, after: Reading, uses: Mapping[tuple[str, tuple[int, int]], list[Use]], record: Mapping, found: Findings
+    before: Reading,
+    after: Reading,
+    uses: Mapping[tuple[str, tuple[int, int]], list[Use]],
+    record: Mapping,
+    found: Findings,
 ) -> None:
     """No target stays under the base of one that moved, where a program goes to both, unless the record says so."""
     now = {(lit.path, index): lit for path in after.literals.values() for index, lit in enumerate(path)}
@@ -222,9 +228,9 @@ def _judge_left_behind(
     listed = {item["target"].lower() for item in record["unmoved"]}
     for literal, use in stayed:
         program = Path(use.program).stem.lower()
-        if (use.program, use.base.round(6).tobytes()) in moved and literal.complete and program not in told:
-            if not literal.name or literal.name.lower() not in listed:
-                found.wrong.append(f"{literal.path}:{literal.line} {literal.name}: left behind and not told")
+        expected = (use.program, use.base.round(6).tobytes()) in moved and literal.complete and program not in told
+        if expected and literal.name.lower() not in listed:
+            found.wrong.append(f"{literal.path}:{literal.line} {literal.name}: left behind and not told")
 
 
 # ---------------------------------------------------------------------------------------------------------------- back
@@ -247,7 +253,7 @@ def judge_back(old: Mapping[str, bytes], back: Mapping[str, bytes], edits: list[
             if problem:
                 found.wrong.append(f"{path}:{was.line} {was.name}: {problem}")
             else:
-                found.restored += was.texts != now.texts
+                found.restored += 1
     return found
 
 

@@ -60,10 +60,15 @@ class _Reader:
         self.shared: dict[str, list[_Datum]] = {}
         self.types: dict[tuple[str, str], str] = {}
         self.bases: dict[int, np.ndarray] = {}
+        self.whole: dict[tuple[str, str], str] = {}
 
     def declare(self, path: str) -> None:
         text, module = self.plain[path], _module(path)
         config = module.endswith("/$config")
+        for name, number in re.findall(
+            r"^[ \t]*(?:DECL[ \t]+)?INT[ \t]+(\w+)[ \t]*=[ \t]*(\d+)\s*$", text, re.I | re.M
+        ):
+            self.whole[module, name.upper()] = number
         for line in _DECLARED.finditer(text):
             for begin, end in split_top(text[: line.end()], ",", line.start(3)):
                 item = re.match(r"\s*([\w$]+)\s*(\[[^\]]*\])?\s*(?:=\s*)?", text[begin:end])
@@ -110,6 +115,9 @@ class _Reader:
 
     def _find(self, name: str, path: str) -> _Datum | None:
         name = "".join(name.split()).upper()
+        bare, bracket, index = name.partition("[")
+        places = [self.whole.get((_module(path), item), item) for item in index.rstrip("]").split(",")]
+        name = bare + bracket + ",".join(places) + ("]" if bracket else "")
         own = self.own.get((_module(path), name))
         shared = self.shared.get(name, [])
         return own if own is not None else shared[0] if len(shared) == 1 else None
@@ -216,7 +224,7 @@ class _Reader:
             found = self._literal(path, "", span, relative)
             if found.texts.keys() & set("XYZABC"):
                 literal = self.reading.add(found)
-        elif not relative and re.fullmatch(r"\w+(\s*\[[\d,\s]+\])?", operand):
+        elif not relative and re.fullmatch(r"\w+(\s*\[[\w,\s]+\])?", operand):
             datum = self._find(operand, path)
             literal = datum.literal if datum is not None else None
         if literal is not None:

@@ -72,7 +72,9 @@ def test_a_known_transform_there_and_back(backup, tmp_path):
     print(code, found.moved, found.offsets, len(found.unseen), len(record["edits"]), len(record["refused"]))
     assert not found.wrong
     assert not found.unseen
-    code, _, err = respot("convert", tmp_path / "out", "-c", tmp_path / "cal.json", "--inverse", "-o", tmp_path / "back", "--json")
+    code, _, err = respot(
+        "convert", tmp_path / "out", "-c", tmp_path / "cal.json", "--inverse", "-o", tmp_path / "back", "--json"
+    )
     assert code in (0, 1), err
     back = laws.judge_back(old, laws.files_of(tmp_path / "back"), record["edits"])
     assert not back.wrong
