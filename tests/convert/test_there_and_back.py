@@ -97,3 +97,19 @@ def test_effects_of_a_theory_calibration_are_solved_for_on_the_way_down(tmp_path
     up = CliRunner().invoke(app, ["convert", str(SAMPLES / "kuka"), "-c", str(tmp_path / "cal.json"), "--dry-run"])
     assert up.exit_code == 2
     assert "not built yet" in up.stderr
+
+
+@pytest.mark.parametrize("record", ["kept", "lost"])
+def test_a_calibration_that_was_turned_back_may_be_applied_again_once(tmp_path, record):
+    """The robot hands programs back without our record: the headers alone must tell it too."""
+    model, folder = tmp_path / "cal.json", SAMPLES / "abb"
+    respot("fit", folder, "--theory", SAMPLES / "theory.csv", "--effects", "none", "-o", model, "--json")
+    for name, options in (("up", ()), ("back", ("--inverse",)), ("again", ())):
+        respot("convert", folder, "-c", model, *options, "-o", tmp_path / name, "--json")
+        folder = tmp_path / name
+        if record == "lost":
+            (folder / "respot.json").unlink()
+    assert numbers(tmp_path / "again") == numbers(tmp_path / "up")
+    once_more = CliRunner().invoke(app, ["convert", str(folder), "-c", str(model), "-o", str(tmp_path / "no")])
+    assert once_more.exit_code == 2
+    assert "ALREADY_APPLIED" in once_more.stderr

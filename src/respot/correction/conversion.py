@@ -16,7 +16,8 @@ from respot.calibration.source_fit import FitOptions, SourceFit, fit_source
 from respot.calibration.stored import load_calibration, source_issues
 from respot.correction.correction import Correction, correct
 from respot.correction.image import Image, RigidImage
-from respot.correction.images import image_of, mark_of
+from respot.correction.images import image_of
+from respot.correction.marks import mark_of, still_applied
 from respot.correction.options import CorrectionOptions
 from respot.issues import BadInputError, Issue
 from respot.languages import LANGUAGES
@@ -232,7 +233,7 @@ def record_of(conversion: Conversion) -> dict[str, Any]:
         "source": str(conversion.source.path),
         "source_sha256": conversion.source.sha256,
         "verified": True,
-        "applied": [*_applied(conversion.source), _mark(correction.calibration_hash, correction.robot)],
+        "applied": _applied_after(conversion),
         "issues": [issue.as_json() for issue in conversion.issues],
         "contents": {path: _sha256(correction.files.get(path, data)) for path, data in files.items()},
         "files": {
@@ -240,6 +241,16 @@ def record_of(conversion: Conversion) -> dict[str, Any]:
         },
         **conversion.as_json(),
     }
+
+
+def _applied_after(conversion: Conversion) -> list[str]:
+    """Marks of all calibrations that are in force in what is written."""
+    correction = conversion.correction
+    own, others = list[str](), list[str]()
+    for mark in _applied(conversion.source):
+        (own if _mark(mark.partition(" ")[0], correction.robot) == mark else others).append(mark)
+    kept = still_applied((mark.partition(" ")[0] for mark in own), correction.calibration_hash)
+    return [*others, *(_mark(mark, correction.robot) for mark in (*kept, correction.calibration_hash))]
 
 
 def _sha256(data: bytes) -> str:

@@ -14,6 +14,7 @@ from respot import __version__
 from respot.calibration.region import outside
 from respot.correction.configuration import configure
 from respot.correction.image import Image
+from respot.correction.marks import still_applied
 from respot.correction.options import CorrectionOptions
 from respot.correction.points import (
     PointEdit,
@@ -324,7 +325,7 @@ def _changed_files(
         file = robot.files[path]
         place = language.header_place(file)
         if place is not None:
-            earlier = tuple(sorted(applied_calibrations(file.source)))
+            earlier = tuple(sorted(still_applied(applied_calibrations(file.source), header.calibration_hash)))
             said = Header(
                 __version__, header.direction, header.kind, file.source.sha256, header.calibration_hash, earlier
             )

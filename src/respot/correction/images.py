@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -22,12 +21,6 @@ from respot.kinematics.opw import OpwRobot
 from respot.languages import LANGUAGES
 from respot.spots import Source
 from respot.tables import read_table
-
-
-def mark_of(calibration: Calibration, *, inverse: bool) -> str:
-    """SHA-256 (hex) that tells a calibration, and the way it is applied, from others."""
-    own = calibration.content_hash
-    return hashlib.sha256(f"inverse {own}".encode("ascii")).hexdigest() if inverse else own
 
 
 def image_of(
