@@ -24,9 +24,9 @@ def write(folder: Path, files: dict[str, bytes]) -> Path:
     return folder
 
 
-def lines(changes: list[dict], side: str) -> Counter[str]:
-    """Lines that went or came; RAPID's comma before an option says nothing."""
-    found = (line for change in changes if change["kind"] != "moved" for line in change[side])
+def lines(changes: list[dict], side: str, moved: bool = False) -> Counter[str]:
+    """Lines that went or came, or that stand elsewhere; RAPID's comma before an option says nothing."""
+    found = (line for change in changes if (change["kind"] == "moved") == moved for line in change[side])
     return Counter(line.replace(",\\WObj", "\\WObj") for line in found)
 
 
@@ -67,8 +67,7 @@ def test_exactly_the_edits_are_listed(language, seed, count, tmp_path_factory):
     assert gone - come == Counter(wanted.gone) - Counter(wanted.come)
     assert come - gone == Counter(wanted.come) - Counter(wanted.gone)
     assert not telling(gone - Counter(wanted.gone)) and not telling(come - Counter(wanted.come))
-    blocks = [line for change in robot["code"] if change["kind"] == "moved" for line in change["new_lines"]]
-    assert telling(Counter(blocks)) == telling(Counter(wanted.blocks))
+    assert telling(lines(robot["code"], "new_lines", moved=True)) == telling(Counter(wanted.blocks))
     assert wanted.noise <= set(robot["noise_counts"])
     assert not robot["files"]
     found = (wanted.moved, wanted.frames, wanted.added, wanted.removed, wanted.renamed, wanted.gone, wanted.come)
