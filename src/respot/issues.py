@@ -163,6 +163,7 @@ CODES: dict[str, tuple[Level, str]] = {
     "EFFECTS_TOO_LARGE": (_E, "the pose that lands a target where it should is not found"),
     "NO_KINEMATICS": (_E, "effects of the arm are to be written, and no kinematic model of the robot is known"),
     "WRONG_FRAME": (_E, "spots lie under another frame than is written: the program is wrong, not its points"),
+    "FRAME_KEPT": (_W, "a tool or base is off and stays as it is, for other programs use it"),
     "RIGID_PART_KEPT": (_I, "a rigid motion of all points under a base is left out: the registration swallows it"),
     "NOT_CHECKED": (_I, "what respot does not check"),
     "VERIFY_FAILED": (_E, "what was written is not what was intended"),

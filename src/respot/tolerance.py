@@ -10,6 +10,12 @@ from decimal import Decimal
 LENGTH_DECIMALS = 3
 ANGLE_DECIMALS = 4
 QUATERNION_DECIMALS = 7
+#: The same of a tool or base: its last digit is multiplied by the length of a part.
+FRAME_LENGTH_DECIMALS = 6
+FRAME_ANGLE_DECIMALS = 6
+FRAME_QUATERNION_DECIMALS = 9
+#: Digits of points, bases and tools together leave the flange this near to where it was intended.
+FLANGE_MM, FLANGE_DEG = 0.01, 0.001
 #: No changed number gets more decimals than a double can hold next to a metre.
 MOST_DECIMALS = 12
 

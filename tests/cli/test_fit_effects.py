@@ -87,14 +87,6 @@ def test_none_leaves_names_as_given(respot, backup, theory):
     assert all(spot["id"] == spot["reference_id"] for spot in result["spots"])
 
 
-@pytest.mark.parametrize("effects", ["auto", "tool_offset"])
-def test_programs_are_not_corrected_by_a_tool_offset(respot, backup, theory, tmp_path, effects):
-    result = respot("convert", backup, "--theory", theory, "-o", "out", "--effects", effects)
-    assert result.code == 2
-    assert "BAD_OPTION" in result.err
-    assert not (tmp_path / "out").exists()
-
-
 def test_a_saved_tool_offset_is_not_left_out_by_convert(respot, backup, tables):
     from respot.calibration import Calibration
 

@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from respot.cli import app
-from tests.convert.independent import NUMBER, SAMPLES, RobotFiles, table
+from tests.convert.independent import NUMBER, SAMPLES, RobotFiles, from_abb, from_kuka, table
 
 HEADER = re.compile(r"[ \t]*[;!]respot: [^\r\n]*\r\n")
 
@@ -233,3 +233,35 @@ def test_a_calibration_of_another_robot_is_refused(tmp_path):
     assert result.exit_code == 2
     assert "ANOTHER_ROBOT" in result.stderr and "--any-robot" not in result.stderr
     assert not (tmp_path / "out").exists()
+
+
+TOOLS = {
+    "kuka": ("KRC/R1/System/$config.dat", r"^TOOL_DATA\[1\]=\{(.*?)\}"),
+    "abb": ("RAPID/TASK1/SYSMOD/WeldData.sys", r"tWeldGun1:=\[TRUE,(\[\[.*?\]\]),"),
+}
+
+
+def tool_of(robot: RobotFiles, folder: Path) -> np.ndarray:
+    path, pattern = TOOLS[robot.name]
+    text = re.search(pattern, (folder / path).read_bytes().decode("latin-1"), re.M)[1]
+    read = from_kuka if robot.name == "kuka" else from_abb
+    return read(*(float(value) for value in re.findall(NUMBER, text)))
+
+
+def test_frames_and_points_give_the_same_flange_poses(robot, theory, converted, tmp_path):
+    points, _ = converted
+    code, out, err = run(
+        "convert", robot.root, "--theory", theory, "-o", tmp_path / "frames", "--apply", "frames", "--json"
+    )
+    assert code == 0, err
+    assert sorted(edit["depth"] for edit in json.loads(out)["edits"] if edit["shift_mm"]) == ["base", "base"]
+    one, other = robot.read(points), robot.read(tmp_path / "frames")
+    moved = [name for name in one if name.split(".")[0] in robot.welding]
+    assert len(moved) >= 27
+    for name in moved:
+        flanges = [
+            read[name].base @ read[name].pose @ np.linalg.inv(tool_of(robot, folder))
+            for read, folder in ((one, points), (other, tmp_path / "frames"))
+        ]
+        assert np.linalg.norm((flanges[0] - flanges[1])[:3, 3]) < 1e-3, name
+        assert np.abs((flanges[0] - flanges[1])[:3, :3]).max() < 2e-6, name

@@ -80,7 +80,7 @@ def test_a_retrofit_takes_the_old_calibration_up_and_the_new_one_down(tmp_path, 
 
 
 @pytest.mark.parametrize("frame", ["same", "free"])
-def test_effects_of_a_theory_calibration_are_solved_for_on_the_way_down(tmp_path, frame):
+def test_effects_of_a_theory_calibration_are_applied_on_the_way_up_and_solved_for_on_the_way_down(tmp_path, frame):
     """The floor grows by 2 mm/m: the simulation's programs must be told to go less far there."""
     scale = Term("scale", {}, (Parameter("growth", "mm/m", 2.0),), {"centre": [0.0, 0.0, 0.0]})
     spots = read_source(SAMPLES / "kuka", ()).spots
@@ -94,9 +94,12 @@ def test_effects_of_a_theory_calibration_are_solved_for_on_the_way_down(tmp_path
     assert made["left_to_registration"] == []
     down = read_source(there, spots.ids).spots
     assert down.positions * 1.002 + shift == pytest.approx(spots.positions, abs=2e-3)
-    up = CliRunner().invoke(app, ["convert", str(SAMPLES / "kuka"), "-c", str(tmp_path / "cal.json"), "--dry-run"])
-    assert up.exit_code == 2
-    assert "not built yet" in up.stderr
+    aligned = respot(
+        "convert", SAMPLES / "kuka", "-c", tmp_path / "cal.json", "-o", tmp_path / "up", "--force", "--json"
+    )
+    assert aligned["direction"] == "align"
+    up = read_source(tmp_path / "up", spots.ids).spots
+    assert up.positions == pytest.approx(spots.positions * 1.002 + shift, abs=2e-3)
 
 
 @pytest.mark.parametrize("record", ["kept", "lost"])

@@ -23,17 +23,24 @@ def diff(old: Path, new: Path, *options: str) -> dict:
 
 
 def assert_agree(edits: list[dict], record: dict) -> None:
-    """Every edit is seen as a move, by as much; nothing else is seen, but our own headers."""
-    seen = {}
+    """Every edit is seen as a move of a target or a change of a frame, by as much; nothing else, but our own headers."""
+    seen, frames = {}, {}
     for robot in record["robots"]:
+        taken_along = bool(robot["frames"])
         for item in robot["moved"]:
+            if taken_along and not item["shift"]["distance"] and not item["turn_deg"] and not item["configuration"]:
+                continue  # its numbers stay: it moves with its base
             seen.setdefault((item["old"]["path"], item["old"]["line"]), []).append(item)
-        assert not [robot[name] for name in ("frames", "added", "removed", "renamed", "code", "files") if robot[name]]
+        for item in robot["frames"]:
+            frames.setdefault((item["old"]["path"], item["old"]["line"]), []).append(item)
+        assert not [robot[name] for name in ("added", "removed", "renamed", "code", "files") if robot[name]]
         assert set(robot["noise_counts"]) <= {"respot"}
     assert not record["files"]
     claimed: dict[tuple[str, int], list[dict]] = {}
     for edit in edits:
-        claimed.setdefault((edit["path"], edit["line"]), []).append(edit)
+        if edit["depth"] == "point":
+            claimed.setdefault((edit["path"], edit["line"]), []).append(edit)
+    assert {(edit["path"], edit["line"]) for edit in edits if edit["depth"] != "point"} == frames.keys()
     assert seen.keys() == claimed.keys()
     for place, found in seen.items():
         assert len(found) == len(claimed[place]), place

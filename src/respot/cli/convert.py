@@ -52,6 +52,15 @@ def run(
             "a compensation is undone.",
         ),
     ] = False,
+    apply: Annotated[
+        str | None,
+        typer.Option(
+            "--apply",
+            help="points or frames: whether what a whole base or tool is off goes into its data instead of into every "
+            "point. The flange goes to the same places. A frame that other programs use stays.",
+            show_default="points",
+        ),
+    ] = None,
     bases: Annotated[
         str,
         typer.Option(
@@ -131,13 +140,12 @@ def run(
             raise BadInputError("BAD_OPTION", message)
         if bases not in ("kept", "remeasured"):
             raise BadInputError("BAD_OPTION", f"--bases is kept or remeasured, not {bases}")
+        if apply not in (None, "points", "frames"):
+            raise BadInputError("BAD_OPTION", f"--apply is points or frames, not {apply}")
+        if apply == "frames" and partial:
+            message = "--partial leaves targets behind, and a base or tool that changes takes all of them along"
+            raise BadInputError("BAD_OPTION", f"--apply frames: {message}")
         looked_for = effects_named(effects or ("auto" if measured else "swapped_ids"))
-        if not measured and ("tool_offset" in looked_for or looked_for == "auto"):
-            message = (
-                "programs are not corrected by a tool offset: it would have to go into the tool as well, or the tool "
-                "be corrected twice; look for it with fit, correct the TCP, and convert with --effects swapped_ids"
-            )
-            raise BadInputError("BAD_OPTION", message)
         model = None if robot is None else robot_of(robot)
         chosen = CorrectionOptions(
             programs,
@@ -151,6 +159,7 @@ def run(
             max_residual,
             force,
             covariates,
+            "frames" if apply == "frames" else "points" if apply == "points" else None,
         )
         if calibration is not None:
             if theory or measured:

@@ -60,7 +60,8 @@ def _show_effects(record: Mapping[str, Any]) -> None:
 def _show_moved(conversion: Conversion) -> None:
     programs: dict[str, list[float]] = {}
     for edit in conversion.correction.edits:
-        programs.setdefault(edit.path, []).append(edit.shift_mm if edit.edit.reason == "point" else -1.0)
+        if edit.depth == "point":
+            programs.setdefault(edit.path, []).append(edit.shift_mm if edit.edit.reason == "point" else -1.0)
     rows = []
     for path, shifts in programs.items():
         moved = [shift for shift in shifts if shift >= 0.0]
@@ -69,7 +70,10 @@ def _show_moved(conversion: Conversion) -> None:
     if rows:
         columns = [Column("file", number=False), Column("targets"), Column("offsets"), Column("moved by [mm]")]
         table(columns, rows)
-    else:
+    for edit in conversion.correction.edits:
+        if edit.depth != "point":
+            line(f"  {edit.target} ({edit.path}:{edit.line}) takes its targets along: up to {edit.shift_mm:.2f} mm")
+    if not conversion.correction.edits:
         line("  no target moves: every file is as it was")
 
 

@@ -9,8 +9,8 @@ measured calibration) applies the effects: ``P = G^-1 E(P')``, with the G that t
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Hashable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -21,12 +21,13 @@ from respot.calibration.calibration import Calibration
 from respot.calibration.effects.catalogue import MECHANISMS
 from respot.calibration.effects.moved import beyond
 from respot.calibration.effects.term import Term
+from respot.correction.changeable import Changeable
 from respot.correction.columns import SpotColumns
 from respot.correction.gauge import best_motion, same_motion, size_of
 from respot.correction.goals import Goal, goals_of, stacked
 from respot.correction.image import Direction
 from respot.correction.landing import Errors, Seats, landed, solve
-from respot.correction.points import new_offset
+from respot.correction.points import moves_at_all, new_offset
 from respot.correction.scope import Moving, Refusal, Scope
 from respot.correction.seats import Seated, Seating
 from respot.correction.written import Split
@@ -34,6 +35,7 @@ from respot.geometry import IDENTITY, Array, distance_mm, turn_deg
 from respot.issues import Issue
 from respot.kinematics.cell import Reason, RobotCell
 from respot.languages import Language
+from respot.program.frames import Frame
 from respot.program.moves import Move
 from respot.program.robot import Robot
 
@@ -107,6 +109,9 @@ class Compensation:
         self._gauged = calibration.kind == "measured" and calibration.frame == "free"
         # theory: the rigid part is what the simulation lacks; the floor is found by solving
         self._solving = choice.inverse == (calibration.kind == "theory")
+        self._kind = calibration.kind
+        self._tools: dict[int, RigidTransform] = {}
+        self._taught: dict[Hashable, RigidTransform] = {}
         self._fixed = IDENTITY if self._gauged else calibration.source2reference.inv()
         self._poses: dict[int, RigidTransform] = {}
         self._offsets: dict[int, Array] = {}
@@ -117,6 +122,20 @@ class Compensation:
     def direction(self) -> Direction:
         """For the real cell where poses are solved for; back to what the simulation shows otherwise."""
         return "compensate" if self._solving else "align"
+
+    def deviation(self, base2spots: RigidTransform) -> RigidTransform | None:
+        """The rigid part; in a free frame what all points of a base need where their tool's data change.
+
+        A base that was taught with a wrong tool holds the error that all its points have in common.
+        """
+        if self._gauged:
+            return self._taught.get(_place(base2spots))
+        rigid = self._fixed if self._solving else self._fixed.inv()
+        return rigid if moves_at_all(IDENTITY, rigid) else None
+
+    def tool_change(self, tool: Frame) -> RigidTransform | None:
+        """What the data of a tool get on the right: the fitted offset, or on the way back its inverse."""
+        return self._tools.get(id(tool))
 
     def pose(self, moving: Moving) -> RigidTransform:
         """New ``target2base``."""
@@ -139,9 +158,10 @@ class Compensation:
             "left_to_registration": self._bases,
         }
 
-    def see(self, scope: Scope) -> Sequence[Refusal]:
+    def see(self, scope: Scope, changeable: Changeable | None = None) -> Sequence[Refusal]:
         """Solve for all targets at once."""
         goals, offsets = goals_of(scope, self._cell.spots)
+        self._see_tools(goals, offsets, scope, changeable)
         with_rail = any(term.effect == "rail" for term in self._split.errors.terms)
         cell = self._cell
         seating = Seating(
@@ -154,8 +174,8 @@ class Compensation:
             self._split.of_the_arm,
             with_rail,
         )
-        closed, others = self._states(goals, offsets)
-        errors = self._split.errors
+        errors = self._errors
+        closed, others = self._states(errors, goals, offsets)
         first = seating.seat(closed, errors.terms)
         motions = self._motions(errors, first)
         seated = [(errors, first), *((some, seating.seat(of, some.terms)) for some, of in others)]
@@ -166,10 +186,42 @@ class Compensation:
             self._apply(some, places, motions, found, objections)
             self.issues += _beyond(some, places)
         refusals = self._take(goals, offsets, found, objections)
+        self._taught = self._motions_of_bases(first) if self._gauged and self._tools else {}
         return [*refusals, *self._departures(goals, found)]
 
+    # --- the tool
+
+    @property
+    def _errors(self) -> Errors:
+        """What is solved for, or applied: on the way back tool data that were corrected have no error."""
+        errors = self._split.errors
+        return replace(errors, tool_offset=None) if self._tools and self._choice.inverse else errors
+
+    def _see_tools(
+        self, goals: Sequence[Goal], offsets: Sequence[Goal], scope: Scope, changeable: Changeable | None
+    ) -> None:
+        """Decide whether the fitted offset goes into the data of the tool, all of them or none, and say so."""
+        offset = self._split.errors.tool_offset
+        if offset is None:
+            return
+        fitted = {_tool(goal) for goal in goals if goal.spot in self._matched}
+        using = [goal for goal in (*goals, *offsets) if _tool(goal) in fitted]
+        tools = {id(tool): tool for goal in using if (tool := goal.move.tool) is not None}
+        if changeable is not None:
+            reason = next(filter(None, (changeable.objection(tool, "tool") for tool in tools.values())), "")
+            reason = reason or _with_others(scope, tools)
+            if reason:
+                tool = next(iter(tools.values()))
+                message = f"{tool} stays as it is, and its error goes into the points: {reason}"
+                self.issues.append(Issue("FRAME_KEPT", message, tool.path, tool.line))
+            else:
+                change = RigidTransform.from_translation(-offset if self._choice.inverse else offset)
+                self._tools = dict.fromkeys(tools, change)
+        names = ", ".join(dict.fromkeys(str(tool) for tool in tools.values()))
+        self.issues.append(_said_of_tool(offset, names, bool(self._tools), self._solving, self._kind))
+
     def _states(
-        self, goals: Sequence[Goal], offsets: Sequence[Goal]
+        self, errors: Errors, goals: Sequence[Goal], offsets: Sequence[Goal]
     ) -> tuple[list[Goal], list[tuple[Errors, list[Goal]]]]:
         """Goals with the fitted tool closed; and all others, with the errors that are left there."""
         tools = {_tool(goal) for goal in goals if goal.spot in self._matched}
@@ -177,7 +229,6 @@ class Compensation:
         closed = [goal for goal in fitted if goal.welds]
         opened = [goal for goal in fitted if not goal.welds]
         foreign = [goal for goal in (*goals, *offsets) if _tool(goal) not in tools]
-        errors = self._split.errors
         if foreign and (errors.tool_offset is not None or any(_of_tool(term) for term in errors.terms)):
             names = list(dict.fromkeys(str(goal.move.tool) for goal in foreign))
             message = f"errors of the tool are those of the fitted spots' own: targets of {', '.join(names)} go without"
@@ -216,11 +267,29 @@ class Compensation:
                 found.setdefault(_key(goal), []).append(row)
         return {key: np.array(rows, dtype=np.intp) for key, rows in found.items()}
 
+    def _motions_of_bases(self, closed: Seated) -> dict[Hashable, RigidTransform]:
+        """Best motion of the fitted spots of each base from what they say to what they would say of the new tool."""
+        found: dict[Hashable, RigidTransform] = {}
+        for key, rows in self._bodies(closed).items():
+            old, new = [], []
+            for goal in (closed.goals[row] for row in rows):
+                pose = self._poses.get(id(goal.moving))
+                if pose is not None and goal.target.pose is not None:
+                    old.append((goal.base2spots * goal.target.pose).translation)
+                    new.append((goal.base2spots * pose * self._tool_of(goal)).translation)
+            found[key] = best_motion(np.array(old).reshape(-1, 3), np.array(new).reshape(-1, 3))
+        return found
+
+    def _tool_of(self, goal: Goal) -> RigidTransform:
+        return self._tools.get(id(goal.move.tool), IDENTITY)
+
     def _gauge(self, errors: Errors, seats: Seats) -> RigidTransform:
-        """G of a body of spots: the best motion from told poses to where they land."""
+        """G of a body of spots: the best motion from told poses, of the tool that they end with, to where they land."""
         told = seats.observations.positions
         if not self._solving:
             now, _ = seats.at(seats.poses)
+            if self._tools:
+                told = np.asarray((seats.poses * next(iter(self._tools.values()))).translation)
             return best_motion(told, np.asarray(landed(errors, now).translation))
         motion, start = IDENTITY, None
         for _ in range(_GAUGE_STEPS):
@@ -255,7 +324,9 @@ class Compensation:
             left = solution.left_mm
         else:
             now, reached = seated.seats.at(seated.seats.poses)
-            images, good, left = motion.inv() * landed(errors, now), reached, np.zeros(len(now))
+            tools = stacked(map(self._tool_of, seated.goals))
+            # what the tool's data will say is no matter of the pose: the flange stays where it is
+            images, good, left = motion.inv() * landed(errors, now) * tools.inv(), reached, np.zeros(len(now))
         for row, goal in enumerate(seated.goals):
             if good[row]:
                 found[id(goal)] = images[row]
@@ -327,8 +398,12 @@ class Compensation:
 
 
 def _key(goal: Goal) -> Hashable:
+    return _place(goal.base2spots)
+
+
+def _place(base2spots: RigidTransform) -> Hashable:
     """What bases have in common that lie in the same place."""
-    return tuple((np.round(goal.base2spots.as_matrix(), 6) + 0.0).ravel().tolist())
+    return tuple((np.round(base2spots.as_matrix(), 6) + 0.0).ravel().tolist())
 
 
 def _tool(goal: Goal) -> Hashable:
@@ -337,6 +412,36 @@ def _tool(goal: Goal) -> Hashable:
     if tool is None or tool.pose is None:
         return None
     return tuple((np.round(tool.pose.as_matrix(), 6) + 0.0).ravel().tolist())
+
+
+def _with_others(scope: Scope, tools: Collection[int]) -> str:
+    """Say which target is gone to with one of the tools and with another one."""
+    for item in scope.moving:
+        used = {id(move.tool) for move in item.moves}
+        if not used.isdisjoint(tools) and not used <= set(tools):
+            return f"{item.target.name} is used with another tool as well"
+    return ""
+
+
+def _said_of_tool(offset: Array, names: str, in_data: bool, solving: bool, kind: str) -> Issue:
+    """Say where the error of the tool is written, and what a person must not do."""
+    x, y, z = offset.tolist()
+    what = f"tool_offset {x:+.2f} {y:+.2f} {z:+.2f} mm"
+    if in_data:
+        message = f"{what} is written into {names}: points keep what they say of the tip"
+    elif solving:
+        message = (
+            f"{what} is written into the points: leave the TCP in the tool data as it is. Correct the tool or the "
+            "points, never both"
+        )
+    elif kind == "theory":
+        message = (
+            f"{what}: the points are those of a tip that is where its data say, and {names} of this backup is not: the "
+            "simulation must bring its own tool"
+        )
+    else:
+        message = f"{what} is taken out of the points"
+    return Issue("EFFECT_WRITTEN", message)
 
 
 def _of_tool(term: Term) -> bool:

@@ -16,12 +16,12 @@ from respot.calibration.source_fit import FitOptions, SourceFit, fit_source
 from respot.calibration.stored import load_calibration, source_issues
 from respot.correction.correction import Correction, correct
 from respot.correction.image import Image, RigidImage
-from respot.correction.images import image_of
+from respot.correction.images import image_of, refuse_other_state
 from respot.correction.marks import mark_of, still_applied
 from respot.correction.options import CorrectionOptions
 from respot.issues import BadInputError, Issue
 from respot.languages import LANGUAGES
-from respot.languages.writing import says_compensated
+from respot.languages.writing import applied_calibrations, says_compensated
 from respot.program.moves import Move
 from respot.program.robot import Robot
 from respot.spots import Source, read_source
@@ -82,7 +82,7 @@ class Conversion:
                     "path": edit.path,
                     "line": edit.line,
                     "target": edit.target,
-                    "depth": "point",
+                    "depth": edit.depth,
                     "reason": edit.edit.reason,
                     "before": edit.before,
                     "after": edit.after,
@@ -148,11 +148,15 @@ def convert(
         )
     if read.robot is None:
         raise BadInputError("NO_ROBOT", "is a table: only a backup or a program can be converted", str(source))
+    _refuse_other_depth(read, model, options)
     image = image_of(model, fitted, read, options, str(calibration or reference))
     mark = mark_of(model, inverse=options.inverse)
     _refuse_recorded(read, _mark(mark, read.robot))
     if model.kind == "measured" and not options.inverse:
         _refuse_compensated(read, read.robot)
+    _refuse_headed(read.robot, mark)
+    if fitted is None and not options.inverse and not _turned_back(read.robot, model):
+        refuse_other_state(model, read, options, str(calibration))
     moves = _moves_of(read, ids)
     if not moves:
         detail = f": {read.spots.issues[0]}" if read.spots.issues else ""
@@ -184,6 +188,44 @@ def _applied(source: Source) -> list[str]:
     """Hashes of the calibrations that the backup's own record says were applied to it."""
     applied = _record(source).get("applied", [])
     return [item for item in applied if isinstance(item, str)] if isinstance(applied, list) else []
+
+
+def _turned_back(robot: Robot, model: Calibration) -> bool:
+    """Whether programs say that this very calibration was taken out of them again: they are those of the fit."""
+    mark = mark_of(model, inverse=True)
+    return any(mark in applied_calibrations(file.source) for file in robot.files.values())
+
+
+def _refuse_headed(robot: Robot, mark: str) -> None:
+    for path, file in robot.files.items():
+        if mark in applied_calibrations(file.source):
+            message = "this calibration was applied to this file before: start from the original backup"
+            raise BadInputError("ALREADY_APPLIED", message, path)
+
+
+def _refuse_other_depth(source: Source, calibration: Calibration, options: CorrectionOptions) -> None:
+    """A tool offset is taken out again from where it was written.
+
+    Raises
+    ------
+    BadInputError
+        ``BAD_OPTION``: the record says that it stands elsewhere than ``--apply`` says, or nothing says where.
+    """
+    if not options.inverse or calibration.tool_offset is None:
+        return
+    last, place = _record(source), str(source.path / RECORD)
+    made = last.get("calibration")
+    known = isinstance(made, dict) and made.get("hash") == calibration.content_hash
+    edits = last.get("edits") if known else None
+    if not isinstance(edits, list):
+        if options.apply == "frames" and calibration.kind == "measured":
+            message = "nothing says that the tool data hold the offset of this calibration: no record of it is found"
+            raise BadInputError("BAD_OPTION", f"--apply frames: {message}", place)
+        return
+    in_tool = any(isinstance(edit, dict) and edit.get("depth") == "tool" for edit in edits)
+    if in_tool != (options.apply == "frames"):
+        where = "tool data: add --apply frames" if in_tool else "points: leave --apply frames out"
+        raise BadInputError("BAD_OPTION", f"the tool offset of this calibration was written into the {where}", place)
 
 
 def _refuse_compensated(source: Source, robot: Robot) -> None:

@@ -12,7 +12,9 @@ from scipy.spatial.transform import RigidTransform
 
 from respot import __version__
 from respot.calibration.region import outside
+from respot.correction.changeable import Changeable
 from respot.correction.configuration import configure
+from respot.correction.depth import Depth, depth_of, frame_edit
 from respot.correction.image import Image
 from respot.correction.marks import still_applied
 from respot.correction.options import CorrectionOptions
@@ -26,7 +28,7 @@ from respot.correction.points import (
 from respot.correction.preflight import Checked, Preflight
 from respot.correction.scope import Moving, Refusal, Scope, Stay, find_scope
 from respot.correction.sequence import sequences
-from respot.geometry import distance_mm, turn_deg
+from respot.geometry import Array, distance_mm, turn_deg
 from respot.issues import BadInputError, Issue
 from respot.kinematics.cell import Reason, RobotCell
 from respot.kinematics.from_backup import cell_of
@@ -73,8 +75,14 @@ class Correction:
         What cannot be corrected.
     refused_programs : frozenset of str
         Programs that stay as they were.
+    depth : Depth
+        Tools and bases that change with them.
     transitions : sequence of Transition
         Motions between moved and unmoved targets.
+    goals : mapping of int to RigidTransform
+        New ``target2base`` of each target that moves, under the old bases and tools, by `id` of the target.
+    offsets : mapping of int to (3,) array
+        New offsets along the base of motions, under the old bases [mm], by `id` of the motion.
     files : mapping of str to bytes
         The changed files.
     reconfigured : bool
@@ -91,7 +99,10 @@ class Correction:
     edits: Sequence[PointEdit]
     refused: Sequence[Refusal]
     refused_programs: frozenset[str]
+    depth: Depth
     transitions: Sequence[Transition]
+    goals: Mapping[int, RigidTransform]
+    offsets: Mapping[int, Array]
     files: Mapping[str, bytes]
     reconfigured: bool
     issues: Sequence[Issue]
@@ -133,12 +144,13 @@ def correct(
     Raises
     ------
     BadInputError
-        ``ALREADY_APPLIED`` if a file's header names this calibration.
+        ``BAD_OPTION``
     """
-    _refuse_twice(robot, calibration_hash)
     _check_options(robot, options)
     scope = find_scope(robot, spot_moves, options.programs)
-    unseen = image.see(scope)
+    changeable = Changeable(robot, scope) if options.apply == "frames" else None
+    unseen = image.see(scope, changeable)
+    depth = Depth() if changeable is None else depth_of(scope, image, changeable)
     after = {id(moving): image.pose(moving) for moving in scope.moving}
     moving = [item for item in scope.moving if _moves(item, after[id(item)])]
     refused = [*scope.refusals, *unseen, *_too_far(moving, after, options.furthest(kind))]
@@ -146,8 +158,9 @@ def correct(
     printed = {id(item): _printed(robot, language, item, after[id(item)]) for item in moving}
     configured = _configure(cell, moving, printed, language, options, refused)
     flight = Preflight(cell, robot, language, scope, {id(i.target): printed[id(i)] for i in moving}, image.offset)
-    checked, kept, refused_programs = _preflight(flight, scope, moving, options, refused)
-    edits = _edits(robot, language, options, kept, moving, after, configured, scope, image)
+    together = [*(item.programs for item in scope.moving), *(change.programs for change in depth.changes.values())]
+    checked, kept, refused_programs = _preflight(flight, together, moving, options, refused)
+    edits = _edits(robot, language, options, kept, moving, after, configured, scope, image, depth)
     header = _Header(image.direction, kind, calibration_hash)
     return Correction(
         robot=robot,
@@ -158,10 +171,13 @@ def correct(
         edits=edits,
         refused=refused,
         refused_programs=refused_programs,
+        depth=depth,
         transitions=_transitions(robot, scope, {id(i.target) for i in moving if not kept.holds(i)}, refused_programs),
+        offsets={id(move): image.offset(move) for move in _turning(scope, kept)},
+        goals={id(item.target): after[id(item)] for item in moving if not kept.holds(item)},
         files=_changed_files(robot, language, options, edits, header),
         reconfigured=all(id(item) in configured for item in moving if language.has_configuration(item.target)),
-        issues=[*_issues(robot, cell, scope, moving, spot_moves, edits), *image.issues, *checked.issues],
+        issues=[*_issues(robot, cell, scope, moving, spot_moves, edits), *image.issues, *depth.issues, *checked.issues],
     )
 
 
@@ -190,13 +206,6 @@ class _Kept:
         """Whether a target stays as it was; the original of a touched-up target stays with it."""
         names = [name for name in (item.target.name, item.target.original_of) if name]
         return any(self(item.programs, name) for name in names)
-
-
-def _refuse_twice(robot: Robot, calibration_hash: str) -> None:
-    for path, file in robot.files.items():
-        if calibration_hash in applied_calibrations(file.source):
-            message = "this calibration was applied to this file before: start from the original backup"
-            raise BadInputError("ALREADY_APPLIED", message, path)
 
 
 def _check_options(robot: Robot, options: CorrectionOptions) -> None:
@@ -256,11 +265,15 @@ def _hint(code: str) -> str:
 
 
 def _preflight(
-    flight: Preflight, scope: Scope, moving: Sequence[Moving], options: CorrectionOptions, refused: list[Refusal]
+    flight: Preflight,
+    together: Sequence[Collection[str]],
+    moving: Sequence[Moving],
+    options: CorrectionOptions,
+    refused: list[Refusal],
 ) -> tuple[Checked, _Kept, frozenset[str]]:
     """Check what is going to be written; a refused program stays, and what remains is checked again."""
     while True:
-        programs = _refused_programs(scope, refused) if not options.partial else frozenset[str]()
+        programs = _refused_programs(together, refused) if not options.partial else frozenset[str]()
         kept = _Kept(refused, programs, options.partial)
         checked = flight.check({id(item.target) for item in moving if not kept.holds(item)})
         known = {(refusal.program, refusal.target, refusal.code) for refusal in refused}
@@ -275,12 +288,12 @@ def _preflight(
         refused += found
 
 
-def _refused_programs(scope: Scope, refused: Iterable[Refusal]) -> frozenset[str]:
-    """Programs with a refusal, and all that share a moved target with one of them."""
+def _refused_programs(together: Sequence[Collection[str]], refused: Iterable[Refusal]) -> frozenset[str]:
+    """Programs with a refusal, and all that share a moved target, or a changed frame, with one of them."""
     programs = {refusal.program for refusal in refused}
     growing = True
     while growing:
-        more = {name for item in scope.moving if item.programs & programs for name in item.programs} - programs
+        more = {name for group in together if not programs.isdisjoint(group) for name in group} - programs
         programs |= more
         growing = bool(more)
     return frozenset(programs)
@@ -296,21 +309,37 @@ def _edits(
     configured: Mapping[int, Mapping[str, float]],
     scope: Scope,
     image: Image,
+    depth: Depth,
 ) -> list[PointEdit]:
     made = templates(language.name, options.templates)
     edits: list[PointEdit | None] = []
     for item in moving:
         if not kept.holds(item):
             text = robot.files[item.target.path].source.text
-            edits.append(point_edit(item, after[id(item)], configured.get(id(item), {}), text, language, made))
+            written = depth.target(item, after[id(item)])
+            edits.append(point_edit(item, written, configured.get(id(item), {}), text, language, made))
     # one offset that a call hands to a routine with several motions is one literal
-    offsets = {(move.offset.path, move.offset.span): move for move in scope.offsets if move.offset is not None}
+    offsets = {(move.offset.path, move.offset.span): move for move in _turning(scope, kept) if move.offset is not None}
     edits += [
-        offset_edit(move, image.offset(move), robot.files[move.offset.path].source.text, made)
+        offset_edit(move, depth.offset(move, image.offset(move)), robot.files[move.offset.path].source.text, made)
         for move in offsets.values()
-        if not kept((move.program,), str(move.target)) and move.offset is not None and move.base2spots is not None
+        if move.offset is not None
+    ]
+    edits += [
+        frame_edit(change, after, robot, language, made)
+        for change in depth.changes.values()
+        if not kept(change.programs, str(change.frame))
     ]
     return [edit for edit in edits if edit is not None]
+
+
+def _turning(scope: Scope, kept: _Kept) -> list[Move]:
+    """Motions whose offset along the base turns with what it starts from."""
+    return [
+        move
+        for move in scope.offsets
+        if not kept((move.program,), str(move.target)) and move.offset is not None and move.base2spots is not None
+    ]
 
 
 def _changed_files(

@@ -8,10 +8,12 @@ from typing import Any, Literal, Protocol
 
 from scipy.spatial.transform import RigidTransform
 
+from respot.correction.changeable import Changeable
 from respot.correction.points import new_offset, new_pose
 from respot.correction.scope import Moving, Refusal, Scope
 from respot.geometry import Array
 from respot.issues import Issue
+from respot.program.frames import Frame
 from respot.program.moves import Move
 
 Direction = Literal["align", "compensate"]
@@ -36,8 +38,21 @@ class Image(Protocol):
     def issues(self) -> Sequence[Issue]:
         """What a person should know."""
 
-    def see(self, scope: Scope) -> Sequence[Refusal]:
-        """Look at all targets at once, before any is asked for; refusals of those that have no image."""
+    def deviation(self, base2spots: RigidTransform) -> RigidTransform | None:
+        """Rigid motion of all under a base, in the coordinates in which spots are compared [mm], or None."""
+
+    def tool_change(self, tool: Frame) -> RigidTransform | None:
+        """What the data of a tool get on the right, N' = N d; None of a tool that stays as it is."""
+
+    def see(self, scope: Scope, changeable: Changeable | None = None) -> Sequence[Refusal]:
+        """Look at all targets at once, before any is asked for; refusals of those that have no image.
+
+        Parameters
+        ----------
+        scope : Scope
+        changeable : Changeable or None
+            Which tools and bases may be changed; None for depth `points`.
+        """
 
     def pose(self, moving: Moving) -> RigidTransform:
         """New ``target2base``; the old one of a target that was refused."""
@@ -65,7 +80,14 @@ class RigidImage:
     direction: Direction = "align"
     issues: Sequence[Issue] = field(default_factory=list)
 
-    def see(self, scope: Scope) -> Sequence[Refusal]:  # noqa: ARG002 - a rigid motion has an image of everything
+    def deviation(self, base2spots: RigidTransform) -> RigidTransform:  # noqa: ARG002 - everything moves alike
+        """All there is."""
+        return self.motion
+
+    def tool_change(self, tool: Frame) -> None:
+        """No tool is wrong."""
+
+    def see(self, scope: Scope, changeable: Changeable | None = None) -> Sequence[Refusal]:  # noqa: ARG002 - as above
         """Nothing is refused."""
         return ()
 

@@ -44,15 +44,16 @@ def image_of(
     BadInputError
         Nothing can be written, or not rightly.
     """
+    if calibration.tool_offset is not None and calibration.kind == "theory" and options.apply is None:
+        message = (
+            "the calibration has a tool offset, and what becomes of it is for you to say: --apply frames corrects the "
+            "tool data and the points, --apply points the points alone, for a simulation that brings its own tool"
+        )
+        raise BadInputError("BAD_OPTION", message, path)
     effects = bool(calibration.terms) or calibration.tool_offset is not None
-    forward = calibration.kind == "theory" and not options.inverse
-    if forward:
-        _refuse_effects(calibration, path)
     if not effects:
         return _rigid(calibration, options)
-    if fitted is None and calibration.kind == "measured" and not options.inverse:
-        _refuse_other_state(calibration, source, options, path)
-    parts = split(calibration, path)
+    parts = split(calibration, path, inverse=options.inverse)
     cell = _cell(calibration, parts, fitted, source, options)
     return Compensation(cell, calibration, parts, Choice(options.inverse, options.bases, options.max_residual))
 
@@ -73,33 +74,23 @@ def _rigid(calibration: Calibration, options: CorrectionOptions) -> Image:
     raise BadInputError("BAD_OPTION", message)
 
 
-def _refuse_effects(calibration: Calibration, path: str) -> None:
-    """Aligning by the rigid part alone would leave every spot off by its effects."""
-    if calibration.tool_offset is not None:
-        message = (
-            "the calibration has a tool offset: moving points by its rigid part alone would leave every spot off by "
-            "the offset, and whether the tool or the points are to be corrected is for you to say: correct the TCP, "
-            "fit again and convert, or fit with --effects swapped_ids"
-        )
-        raise BadInputError("BAD_OPTION", message, path)
-    if calibration.terms:
-        names = ", ".join(term.label for term in calibration.terms)
-        message = (
-            f"the calibration has effects ({names}), which move each spot by itself: aligning programs by them is "
-            "not built yet; remove the cause and fit again, or fit with --effects swapped_ids"
-        )
-        raise BadInputError("BAD_OPTION", message, path)
+def refuse_other_state(calibration: Calibration, source: Source, options: CorrectionOptions, path: str) -> None:
+    """Refuse a calibration of other programs: it holds for the programs, tools and bases that it was fitted to.
 
-
-def _refuse_other_state(calibration: Calibration, source: Source, options: CorrectionOptions, path: str) -> None:
-    """Effects hold for the joints, tools and bases of the programs that were measured."""
+    Raises
+    ------
+    BadInputError
+        ``ANOTHER_SOURCE``
+    """
     stated = calibration.provenance.get("source_sha256")
-    if options.any_source or stated == source.sha256:
+    effects = bool(calibration.terms) or calibration.tool_offset is not None
+    if options.any_source or stated == source.sha256 or (stated is None and not effects):
         return
     first = calibration.provenance.get("source", "an unnamed source")
+    joints = "joints, " if effects else ""
     message = (
-        f"the calibration was fitted to another state of the programs ({first}); its effects hold for the joints, "
-        "tools and bases of that one. Fit again on this backup, or say --force if you know that they hold here"
+        f"the calibration was fitted to another state of the programs ({first}); it holds for the {joints}tools and "
+        "bases of that one. Fit again on this backup, or say --force if you know that it holds here"
     )
     raise BadInputError("ANOTHER_SOURCE", message, path)
 

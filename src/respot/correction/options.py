@@ -43,6 +43,9 @@ class CorrectionOptions:
         Use a calibration on another robot or another state of the backup than it was fitted to.
     covariates : Path, optional
         Table of columns that effects follow.
+    apply : str, optional
+        ``points`` or ``frames``: whether the errors of whole bases and tools go into their data. None is ``points``
+        where the choice does not matter to what is right.
     """
 
     programs: str | None = None
@@ -56,6 +59,7 @@ class CorrectionOptions:
     max_residual: float = MAX_RESIDUAL
     any_source: bool = False
     covariates: Path | None = None
+    apply: Literal["points", "frames"] | None = None
 
     def furthest(self, kind: str) -> tuple[float, float]:
         """Limits of a shift, mm and degrees, for a calibration of a kind."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
@@ -44,7 +45,9 @@ class PointEdit:
     intended : mapping of str to float
         Value that each changed field must have, before rounding.
     shift_mm, turn_deg : float
-        How far the TCP moves in the world.
+        How far the TCP moves in the world; of a tool or base the farthest of its targets.
+    depth : str
+        ``point``, or ``base`` and ``tool`` of a literal that is one.
     """
 
     path: str
@@ -57,6 +60,7 @@ class PointEdit:
     intended: Mapping[str, float]
     shift_mm: float
     turn_deg: float
+    depth: Literal["point", "base", "tool"] = "point"
 
 
 def in_base(base: RigidTransform, source2reference: RigidTransform) -> RigidTransform:
@@ -115,7 +119,9 @@ def point_edit(
     """
     target = moving.target
     assert target.pose is not None  # noqa: S101
-    values = {**language.pose_values(target, after), **configuration}
+    # only its configuration may change where a base or tool takes it along
+    moves = moves_at_all(target.pose, after)
+    values = {**(language.pose_values(target, after) if moves else {}), **configuration}
     changes = changes_of(text, target.numbers, values, language.decimals(target))
     if not changes:
         return None
@@ -129,8 +135,8 @@ def point_edit(
         before=text[slice(*target.span)],
         after=replacement,
         intended=values,
-        shift_mm=float(distance_mm(target.pose, after)),
-        turn_deg=float(turn_deg(target.pose, after)),
+        shift_mm=float(distance_mm(target.pose, after)) if moves else 0.0,
+        turn_deg=float(turn_deg(target.pose, after)) if moves else 0.0,
     )
 
 

@@ -8,13 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from respot.correction.correction import Correction
+from respot.correction.flange import apart, flanges
 from respot.correction.points import PointEdit
 from respot.languages import Language
 from respot.program.robot import ProgramFile, Robot
 from respot.program.targets import Number
 from respot.source import SourceText, Span
-from respot.tolerance import NumberStyle
+from respot.tolerance import FLANGE_DEG, FLANGE_MM, NumberStyle
 
 
 class VerifyError(Exception):
@@ -46,6 +49,8 @@ def prove(correction: Correction, old: Mapping[str, bytes], new: Mapping[str, by
     robot = next((found for found in robots if found.task == correction.robot.task), None)
     if robot is None:
         raise VerifyError(f"{correction.robot.name} is not found again in what was written")
+    if correction.depth.changes:
+        _check_flanges(correction, robot)
     literals_before, literals_after = _literals(correction.robot), _literals(robot)
     for path in correction.files:
         before, after = literals_before.get(path, []), literals_after.get(path, [])
@@ -58,7 +63,7 @@ _Literal = tuple[Span, Mapping[str, Number]]
 
 
 def _literals(robot: Robot) -> dict[str, list[_Literal]]:
-    """Literals that a correction may change, by file and in order: targets, and offsets along the base."""
+    """Literals that a correction may change, by file and in order: targets, offsets along the base, frames."""
     found: dict[str, list[_Literal]] = {}
     for target in robot.targets:
         found.setdefault(target.path, []).append((target.span, target.numbers))
@@ -67,7 +72,36 @@ def _literals(robot: Robot) -> dict[str, list[_Literal]]:
             named = zip("xyz", move.offset.numbers, strict=True)
             numbers = {name: number for name, number in named if number is not None}
             found.setdefault(move.offset.path, []).append((move.offset.span, numbers))
-    return {path: sorted(literals, key=lambda literal: literal[0]) for path, literals in found.items()}
+    used = (frame for move in robot.moves() for frame in (move.base, move.tool) if frame is not None)
+    for frame in {id(frame): frame for frame in (*robot.tools, *robot.bases, *used)}.values():
+        for literal in (frame.literal, frame.user_literal):
+            if literal is not None:
+                found.setdefault(literal.path, []).append((literal.span, literal.numbers))
+    unique = {path: dict(literals) for path, literals in found.items()}
+    return {path: sorted(literals.items(), key=lambda literal: literal[0]) for path, literals in unique.items()}
+
+
+def _check_flanges(correction: Correction, robot: Robot) -> None:
+    """Check the law of depth on what was written: every motion puts the flange where it was intended, all others too.
+
+    Raises
+    ------
+    VerifyError
+        With the motion.
+    """
+    before, after = list(correction.robot.moves()), list(robot.moves())
+    if len(before) != len(after):
+        raise VerifyError(f"there are {len(after)} motions where there were {len(before)}")
+    intended = flanges(before, correction.goals, correction.offsets)
+    shift, turn = apart(intended, flanges(after))
+    unknown = np.isnan(intended).any(axis=(1, 2)) != np.isnan(flanges(after)).any(axis=(1, 2))
+    wrong = np.flatnonzero(unknown | (shift > FLANGE_MM) | (turn > FLANGE_DEG))
+    if len(wrong):
+        move = before[int(wrong[0])]
+        raise VerifyError(
+            f"{move.path}:{move.line}: {move.target or move.instruction} puts the flange {shift[wrong[0]]:.4f} mm and "
+            f"{turn[wrong[0]]:.5f} degrees from where it was intended"
+        )
 
 
 def _compare(

@@ -67,7 +67,7 @@ class Split:
         return any(term.effect in OF_THE_ARM for term in self.errors.terms)
 
 
-def split(calibration: Calibration, path: str) -> Split:
+def split(calibration: Calibration, path: str, *, inverse: bool = False) -> Split:
     """Split the effects of a calibration.
 
     Parameters
@@ -75,6 +75,8 @@ def split(calibration: Calibration, path: str) -> Split:
     calibration : Calibration
     path : str
         Its file, for messages.
+    inverse : bool
+        Whether it is used the other way round.
 
     Raises
     ------
@@ -93,17 +95,10 @@ def split(calibration: Calibration, path: str) -> Split:
             raise BadInputError("WRONG_FRAME", message, path)
         if is_written(term):
             kept.append((term, value))
-            message = f"{term.label} is written into the points: do not put it right elsewhere as well. {remedy}"
+            message = f"{term.label} {_becomes(calibration.kind, inverse=inverse)}. {remedy}"
             issues.append(Issue("EFFECT_WRITTEN", message, path))
         else:
             issues.append(Issue("EFFECT_NOT_WRITTEN", f"{term.label} is not written into points. {remedy}", path))
-    if calibration.tool_offset is not None:
-        x, y, z = calibration.tool_offset.tolist()
-        message = (
-            f"tool_offset {x:+.2f} {y:+.2f} {z:+.2f} mm is written into the points: leave the TCP in the tool data as "
-            "it is. Correct the tool or the points, never both"
-        )
-        issues.append(Issue("EFFECT_WRITTEN", message, path))
     offset = [] if calibration.tool_offset is None else ["tool_offset"]
     return Split(
         Errors([term for term, _ in kept], [value for _, value in kept], calibration.tool_offset),
@@ -111,6 +106,15 @@ def split(calibration: Calibration, path: str) -> Split:
         [*offset, *(term.label for term, _ in kept)],
         [term.label for term in calibration.terms if not is_written(term)],
     )
+
+
+def _becomes(kind: str, *, inverse: bool) -> str:
+    """Say what becomes of an effect."""
+    if inverse == (kind == "theory"):
+        return "is written into the points: do not put it right elsewhere as well"
+    if inverse:
+        return "is taken out of the points"
+    return "is in the points now: they are where the real robot goes with it"
 
 
 def is_written(term: Term) -> bool:

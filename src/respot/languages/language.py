@@ -47,6 +47,8 @@ class Language:
         Fields of a target for a new pose in its base.
     decimals : callable
         ``decimals(target)``: how many decimals each field of a target gets at least when it changes.
+    frame_decimals : mapping of str to int
+        Decimals that a changed field of a tool or base gets at least.
     has_configuration : callable
         Whether a target carries status and turn or confdata.
     header_place : callable
@@ -67,6 +69,7 @@ class Language:
     read_robots: Callable[[str, str, Mapping[str, bytes], Forms], list[Robot]]
     pose_values: Callable[[Target, RigidTransform], dict[str, float]]
     decimals: Callable[[Target], dict[str, int]]
+    frame_decimals: Mapping[str, int]
     has_configuration: Callable[[Target], bool]
     header_place: Callable[[ProgramFile], Span | None]
     configuration_fields: Sequence[str]

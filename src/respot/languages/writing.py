@@ -117,12 +117,19 @@ class Templates:
         changes : iterable of Change
             Numbers within the span, in any order.
         """
+        return self._numbers("literal.j2", text, span, changes)
+
+    def frame(self, text: str, span: Span, changes: Iterable[Change]) -> str:
+        """Text of a tool or base with some of its numbers changed; as `literal`."""
+        return self._numbers("frame.j2", text, span, changes)
+
+    def _numbers(self, template: str, text: str, span: Span, changes: Iterable[Change]) -> str:
         fields: list[Field] = []
         position, end = span
         for change in sorted(changes, key=lambda change: change.number.span):
             fields.append(Field(text[position : change.number.span[0]], change.value, change.style))
             position = change.number.span[1]
-        return self._environment.get_template("literal.j2").render(fields=fields, tail=text[position:end])
+        return self._environment.get_template(template).render(fields=fields, tail=text[position:end])
 
     def complete(self, literal: str, missing: Mapping[str, float], style: NumberStyle) -> str:
         """Text of a literal with components that it left out."""

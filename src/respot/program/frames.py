@@ -2,11 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from scipy.spatial.transform import RigidTransform
 
 from respot.geometry import IDENTITY
+from respot.program.targets import Number
+from respot.source import Span
+
+
+@dataclass(frozen=True, eq=False)
+class PoseLiteral:
+    """A pose that a declaration holds as numbers.
+
+    Parameters
+    ----------
+    pose : RigidTransform
+        What it says [mm].
+    numbers : mapping of str to Number
+        By field of its language, as of a target: ``X`` .. ``C``, or ``x`` .. ``q4``.
+    span : tuple
+        Its place in the file.
+    path, line :
+        File and line.
+    """
+
+    pose: RigidTransform
+    numbers: Mapping[str, Number]
+    span: Span
+    path: str
+    line: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +57,11 @@ class Frame:
         The robot carries it. A held base and a fixed tool make an external TCP.
     user : RigidTransform or None
         Of a work object: its user frame, ``uframe2world``; the rest of the pose is its object frame.
+    literal : PoseLiteral or None
+        The one place where the pose is written, of a work object its object frame; None where it is computed, or
+        written in several places.
+    user_literal : PoseLiteral or None
+        Of a work object: the one place of its user frame.
     """
 
     name: str
@@ -42,6 +73,8 @@ class Frame:
     world: bool = False
     held: bool = False
     user: RigidTransform | None = None
+    literal: PoseLiteral | None = None
+    user_literal: PoseLiteral | None = None
 
     def __str__(self) -> str:
         return f"{self.name} {self.label}".rstrip()

@@ -17,6 +17,7 @@ KRL = Language(
     read_robots=robot.read_robots,
     pose_values=writer.pose_values,
     decimals=writer.decimals,
+    frame_decimals=writer.FRAME_DECIMALS,
     has_configuration=writer.has_configuration,
     header_place=writer.header_place,
     configuration_fields=("S", "T"),

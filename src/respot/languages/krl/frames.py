@@ -12,7 +12,7 @@ from scipy.spatial.transform import RigidTransform
 from respot.geometry import pose, rotation_from_abc
 from respot.languages.krl.run_time import RunTime
 from respot.languages.krl.symbols import Aggregate, Symbol, Symbols
-from respot.program.frames import Frame, Load
+from respot.program.frames import Frame, Load, PoseLiteral
 
 #: Switches of ``bas.src`` that correct all tools or all bases while the robot runs.
 _CORRECTIONS = {"TOOL": ("TOOL_CORR_ON", "TOOL_CORR_W_ON"), "BASE": ("BASE_CORR_ON", "M_BAS_COR_ON")}
@@ -124,7 +124,12 @@ class Frames:
     def _placed(self, symbol: Symbol, found: RigidTransform | None, unknown: str) -> Frame:
         label = self._symbols.config(symbol.name.replace("_DATA[", "_NAME[").replace("]", ",]"))
         text = str(label.value).strip('" ') if label is not None and isinstance(label.value, str) else ""
-        return Frame(symbol.name, text, found, unknown, symbol.path, symbol.line)
+        literal = None
+        if found is not None and isinstance(symbol.value, Aggregate):
+            members = symbol.value.numbers()
+            numbers = {name: members[name] for name in "XYZABC"}
+            literal = PoseLiteral(found, numbers, symbol.value.span, symbol.path, symbol.line)
+        return Frame(symbol.name, text, found, unknown, symbol.path, symbol.line, literal=literal)
 
     def _is_on(self, name: str) -> bool:
         symbol = self._symbols.config(name)

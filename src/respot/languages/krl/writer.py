@@ -11,8 +11,9 @@ from respot.languages.writing import finest, header_span
 from respot.program.robot import ProgramFile
 from respot.program.targets import Target
 from respot.source import Span
-from respot.tolerance import ANGLE_DECIMALS, LENGTH_DECIMALS, STEEP
+from respot.tolerance import ANGLE_DECIMALS, FRAME_ANGLE_DECIMALS, FRAME_LENGTH_DECIMALS, LENGTH_DECIMALS, STEEP
 
+FRAME_DECIMALS = {**dict.fromkeys("XYZ", FRAME_LENGTH_DECIMALS), **dict.fromkeys("ABC", FRAME_ANGLE_DECIMALS)}
 _HEADS = ("routine", "function", "data_list")
 
 

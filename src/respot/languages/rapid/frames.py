@@ -79,7 +79,7 @@ class Frames:
             Where it stands.
         """
         if node.kind == "aggregate":
-            return FrameUse(_READERS[kind](node.text, value_of(node), module.path, 0))
+            return FrameUse(_without_literals(_READERS[kind](node.text, value_of(node), module.path, 0)))
         if node.kind != "reference":
             return FrameUse(_unknown(node.text, "is computed while the robot runs"))
         datum = resolve(node, self._task, module, local)
@@ -124,10 +124,12 @@ class Frames:
         if datum.dimensions:
             return FrameUse(_unknown(name, "is an array", symbol))
         read = _READERS[datum.type]
-        origin, doubt = self._origin(datum, module)
+        origin, doubt, alone = self._origin(datum, module)
         node = origin.value()
         value = None if node is None else value_of(node)
         frame = read(name, value, symbol.path, symbol.line)
+        if not alone:
+            frame = _without_literals(frame)
         reason = doubt or self._run_time.changes(symbol)
         if reason:
             frame = replace(frame, pose=None, unknown=reason)
@@ -136,8 +138,8 @@ class Frames:
             load = Load(load.name, unknown=reason, path=load.path, line=load.line)
         return FrameUse(frame, load=load)
 
-    def _origin(self, datum: Datum, module: Module) -> tuple[Datum, str]:
-        """Return the declaration that gives the value, and why none does.
+    def _origin(self, datum: Datum, module: Module) -> tuple[Datum, str, bool]:
+        """Return the declaration that gives the value, why none does, and whether it is the only one.
 
         Persistent data of several tasks are one: a task that declares it without a value gets that of another. Globals
         of one name in several modules cannot be loaded together: equal values leave no doubt.
@@ -157,8 +159,14 @@ class Frames:
             first, second = list(texts.values())[:2]
             what = _WHAT[datum.type]
             reason = f"the {what} has different values at {first.symbol.place} and {second.symbol.place}"
-            return first, reason
-        return (next(iter(texts.values())) if texts else datum), ""
+            return first, reason, False
+        origin = next(iter(texts.values())) if texts else datum
+        return origin, "", len(candidates) == 1 and origin is datum and not self._run_time.is_shared(symbol)
+
+
+def _without_literals(frame: Frame) -> Frame:
+    """Return a frame that is written in several places, or in the middle of code: none is the place to change it."""
+    return replace(frame, literal=None, user_literal=None)
 
 
 def _unknown(name: str, reason: str, symbol: Symbol | None = None) -> Frame:

@@ -6,12 +6,10 @@ import math
 import re
 from collections.abc import Sequence
 
-from scipy.spatial.transform import RigidTransform
-
 from respot.geometry import pose, rotation_from_quaternion
 from respot.languages.rapid.controller import ControllerData, Instance, MovingTask
 from respot.languages.rapid.symbols import Aggregate, Value
-from respot.program.frames import Frame, Load
+from respot.program.frames import Frame, Load, PoseLiteral
 from respot.program.robot import Fact, Machine
 from respot.program.targets import Number
 from respot.tolerance import QUATERNION_NORM
@@ -19,6 +17,7 @@ from respot.tolerance import QUATERNION_NORM
 TOOL0 = Frame("tool0", world=True, held=True)
 WOBJ0 = Frame("wobj0", world=True)
 
+_POSE = ("x", "y", "z", "q1", "q2", "q3", "q4")
 #: Whether a robot runs with its calibrated lengths: ``r1_calib``; ``r1_uncalib`` are the nominal ones (rapid.md 4.3).
 _CALIBRATED = re.compile(r"r\d+_calib", re.IGNORECASE)
 
@@ -102,10 +101,11 @@ def read_tool(name: str, value: Value | None, path: str, line: int) -> Frame:
         Its declaration.
     """
     items = _items(value)
-    found = _pose(items[1]) if len(items) == 3 else None
+    found = _pose(items[1], path, line) if len(items) == 3 else None
     held = _truth(items[0]) if items else None
-    unknown = "" if found is not None and held is not None else "no literal tooldata"
-    return Frame(name, "", found if held is not None else None, unknown, path, line, held=held is True)
+    if found is None or held is None:
+        return Frame(name, "", None, "no literal tooldata", path, line, held=held is True)
+    return Frame(name, "", found.pose, "", path, line, held=held, literal=found)
 
 
 def read_work_object(name: str, value: Value | None, path: str, line: int) -> Frame:
@@ -114,14 +114,15 @@ def read_work_object(name: str, value: Value | None, path: str, line: int) -> Fr
     Parameters as `read_tool`.
     """
     items = _items(value)
-    user, work = (_pose(items[3]), _pose(items[4])) if len(items) == 5 else (None, None)
+    user, work = (_pose(item, path, line) for item in items[3:]) if len(items) == 5 else (None, None)
     held, fixed = (_truth(items[0]), _truth(items[1])) if len(items) == 5 else (None, None)
     if user is None or work is None or held is None or fixed is None:
         return Frame(name, "", None, "no literal wobjdata", path, line, held=held is True)
     if not fixed:
         unit = str(items[2]).strip('"') or "a mechanical unit"
         return Frame(name, "", None, f"its user frame moves with {unit}", path, line, held=held)
-    return Frame(name, "", user * work, "", path, line, held=held, user=user)
+    whole = user.pose * work.pose
+    return Frame(name, "", whole, "", path, line, held=held, user=user.pose, literal=work, user_literal=user)
 
 
 def read_load(name: str, value: Value | None, path: str, line: int) -> Load:
@@ -147,16 +148,18 @@ def _items(value: Value | None) -> Sequence[Value]:
     return value.items if isinstance(value, Aggregate) else ()
 
 
-def _pose(value: Value) -> RigidTransform | None:
+def _pose(value: Value, path: str, line: int) -> PoseLiteral | None:
     if not isinstance(value, Aggregate) or value.shape() != (3, 4):
         return None
     parts = [item.numbers() for item in value.items if isinstance(item, Aggregate)]
-    if any(part is None for part in parts):
+    numbers = [number for part in parts if part is not None for number in part]
+    if len(numbers) != len(_POSE):
         return None
-    position, quaternion = ([float(number.value) for number in part] for part in parts if part is not None)
-    if abs(math.hypot(*quaternion) - 1.0) > QUATERNION_NORM:
+    values = [float(number.value) for number in numbers]
+    if abs(math.hypot(*values[3:]) - 1.0) > QUATERNION_NORM:
         return None
-    return pose(position, rotation_from_quaternion(quaternion))
+    found = pose(values[:3], rotation_from_quaternion(values[3:]))
+    return PoseLiteral(found, dict(zip(_POSE, numbers, strict=True)), value.span, path, line)
 
 
 def _truth(value: Value) -> bool | None:

@@ -9,12 +9,21 @@ from respot.languages.writing import finest, header_span
 from respot.program.robot import ProgramFile
 from respot.program.targets import Target
 from respot.source import Span
-from respot.tolerance import LENGTH_DECIMALS, QUATERNION_DECIMALS
+from respot.tolerance import (
+    FRAME_LENGTH_DECIMALS,
+    FRAME_QUATERNION_DECIMALS,
+    LENGTH_DECIMALS,
+    QUATERNION_DECIMALS,
+)
 
 _POSITION = ("x", "y", "z")
 _QUATERNION = ("q1", "q2", "q3", "q4")
 _LEAST = ((_POSITION, LENGTH_DECIMALS), (_QUATERNION, QUATERNION_DECIMALS))
 _CONFIGURATION = dict.fromkeys(("cf1", "cf4", "cf6", "cfx"), 0)
+FRAME_DECIMALS = {
+    **dict.fromkeys(_POSITION, FRAME_LENGTH_DECIMALS),
+    **dict.fromkeys(_QUATERNION, FRAME_QUATERNION_DECIMALS),
+}
 
 
 def decimals(target: Target) -> dict[str, int]:
