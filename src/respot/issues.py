@@ -167,6 +167,22 @@ CODES: dict[str, tuple[Level, str]] = {
     "RIGID_PART_KEPT": (_I, "a rigid motion of all points under a base is left out: the registration swallows it"),
     "NOT_CHECKED": (_I, "what respot does not check"),
     "VERIFY_FAILED": (_E, "what was written is not what was intended"),
+    # a line of robots
+    "BAD_LINE_FILE": (_E, "a line file cannot be used"),
+    "UNKNOWN_KEY": (_E, "a line file has a key that respot does not know"),
+    "SAME_ROBOT_TWICE": (_E, "a robot stands twice in a line file"),
+    "ANOTHER_LINE": (_E, "the output folder belongs to another line"),
+    "BAD_LEDGER": (_E, "the ledger of a line cannot be used"),
+    "LINE_IS_RUNNING": (_E, "another process is at work on the same output folder"),
+    "LEDGER_STOPPED": (_E, "the ledger of a line can no longer be written"),
+    "NO_CLUSTER": (_E, "a cluster cannot be used"),
+    "NOTHING_TO_WRITE": (_I, "no program of a robot changes, and none is written"),
+    "INPUT_CHANGED": (_E, "an input of a robot changed while it was worked on"),
+    "WORKER_LOST": (_E, "the process that worked on a robot ended"),
+    "TIMED_OUT": (_E, "a robot took longer than --timeout"),
+    "OUT_OF_MEMORY": (_E, "a robot needs more memory than it may have"),
+    "INTERNAL_FAULT": (_E, "a fault of respot"),
+    "ROBOT_LEFT_LINE": (_W, "the output folder holds a robot that is no longer in the line file"),
 }
 
 

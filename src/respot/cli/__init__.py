@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from respot import __version__
-from respot.cli import check, convert, demo, diff, fit, inspect, predict, robots, simulate, undo, validate
+from respot.cli import check, convert, demo, diff, fit, inspect, migrate, predict, robots, simulate, undo, validate
 
 app = typer.Typer(
     name="respot",
@@ -28,6 +28,7 @@ _COMMANDS = {
     "convert": convert,
     "undo": undo,
     "diff": diff,
+    "migrate": migrate,
     "check": check,
     "robots": robots,
     "simulate": simulate,

@@ -1,4 +1,4 @@
-"""Executors: the same work one after the other or on all cores, with progress, and clean at an interrupt."""
+"""Many small pieces of work, one after the other or on all cores, with progress, and clean at an interrupt."""
 
 from __future__ import annotations
 

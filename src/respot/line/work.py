@@ -1,0 +1,264 @@
+"""The work on one robot, where it is done: fit, convert, prove, write, report. Nothing that goes wrong leaves it."""
+
+from __future__ import annotations
+
+import gc
+import hashlib
+import tempfile
+import time
+import traceback
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import chdir, contextmanager
+from pathlib import Path
+from typing import Any
+
+from respot.calibration.final_model import precise
+from respot.calibration.report import report
+from respot.calibration.source_fit import FitOptions, SourceFit, fit_source
+from respot.correction.conversion import Conversion, convert, record_of
+from respot.correction.proof import VerifyError
+from respot.figures.fit_page import fit_page
+from respot.issues import BadInputError, Issue
+from respot.line.jobs import Job, JobResult, inputs_changed
+from respot.line.settings import correction_options, fit_options, tolerance_of
+from respot.output import rehearse, write_backup
+from respot.program.robot import Robot
+
+#: What a robot's folder holds: the backup corrected, the page of its fit, its calibration.
+PROGRAMS, PAGE, CALIBRATION = "programs", "fit.html", "calibration.json"
+#: New objects after which Python looks for garbage: what is read is none.
+_GARBAGE = 1_000_000
+
+
+def do_job(job: Job, staging: str | None, sent: Mapping[str, bytes] | None = None) -> JobResult:
+    """Do the work on one robot.
+
+    Parameters
+    ----------
+    job : Job
+        What to do.
+    staging : str or None
+        New folder for what is written; None where nothing is to be written.
+    sent : mapping of str to bytes, optional
+        The inputs, where their paths mean nothing here; what is written is returned instead.
+    """
+    started = time.process_time()
+    with _few_collections():
+        if sent is None:
+            result = _guarded(job, None if staging is None else Path(staging))
+        else:
+            result = _elsewhere(job, staging is not None, sent)
+    return _with_time(result, time.process_time() - started)
+
+
+def _elsewhere(job: Job, write: bool, sent: Mapping[str, bytes]) -> JobResult:
+    """Do the work on inputs that were sent, in a folder of its own."""
+    with tempfile.TemporaryDirectory(prefix="respot-", ignore_cleanup_errors=True) as folder:
+        line, out = Path(folder, "line"), Path(folder, "out")
+        for path, data in sent.items():
+            place = line / path
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.write_bytes(data)
+        line.mkdir(exist_ok=True)
+        here = Job(job.robot, str(line), job.inputs, job.input_hash, job.option_hash)
+        result = _guarded(here, out if write else None)
+        files = {path: (out / path).read_bytes() for path in result.outputs}
+        return JobResult(**{**vars(result), "files": files})
+
+
+def _guarded(job: Job, out: Path | None) -> JobResult:
+    """Turn every way the work can end into a result."""
+    try:
+        with chdir(job.folder):
+            result = _work(job, out)
+        if inputs_changed(job):
+            message = "a file changed while it was read: run again when nobody writes to it"
+            return JobResult(job.name, "failed", "INPUT_CHANGED", message)
+        return result
+    except MemoryError as error:
+        return _out_of_memory(job, error)
+    except BadInputError as error:
+        if isinstance(error.__cause__, MemoryError):
+            return _out_of_memory(job, error)
+        return JobResult(job.name, "failed", error.issue.code, _words(error.issue))
+    except VerifyError as error:
+        return JobResult(job.name, "failed", "VERIFY_FAILED", f"nothing was written: {error}")
+    except Exception as error:
+        message = f"{type(error).__name__}: {error}; please report it"
+        return JobResult(job.name, "failed", "INTERNAL_FAULT", message, traceback.format_exc())
+
+
+def _out_of_memory(job: Job, error: BaseException) -> JobResult:
+    details = "".join(traceback.format_exception(error))
+    message = "needs more memory than it may have: raise --memory, or look what its backup holds"
+    return JobResult(job.name, "failed", "OUT_OF_MEMORY", message, details)
+
+
+def _work(job: Job, out: Path | None) -> JobResult:
+    robot, options = job.robot, job.robot.options
+    correction = correction_options(options)
+    reference = None if robot.reference is None else Path(robot.reference)
+    calibration = None if robot.calibration is None else Path(robot.calibration)
+    fitting = fit_options(robot.kind or "theory", options)
+    try:
+        conversion = convert(Path(robot.source), reference, calibration, fitting, correction)
+    except BadInputError as error:
+        fitted = _nothing_to_write(error, job, reference, fitting)
+        if fitted is None:
+            raise
+        return _fitted(job, fitted, out)
+    return _converted(job, conversion, out)
+
+
+def _nothing_to_write(error: BadInputError, job: Job, reference: Path | None, fitting: FitOptions) -> SourceFit | None:
+    """Return the fit of a measured robot that needs no correction, where this is why it was not converted.
+
+    In a free frame the rigid part is the place of the tracker: without effects nothing is left to compensate. To a
+    person who asks for programs that is an error; of a robot of a line it is good news.
+    """
+    possible = error.issue.code == "BAD_OPTION" and fitting.kind == "measured" and fitting.frame != "same"
+    if not possible or reference is None or job.robot.options.get("inverse"):
+        return None
+    fitted = fit_source(Path(job.robot.source), reference, fitting)
+    model = fitted.fit.calibration
+    return None if model.terms or model.tool_offset is not None else fitted
+
+
+def _fitted(job: Job, fitted: SourceFit, out: Path | None) -> JobResult:
+    record = report(fitted.fit)
+    record["calibration_hash"] = fitted.fit.calibration.content_hash
+    figures = {
+        **_identity(fitted.source.robot),
+        **_fit_figures(record),
+        "programs": False,
+        "edits": 0,
+        "refused": [],
+        "note": "nothing to compensate: the robot goes where its programs say",
+        "note_code": "NOTHING_TO_WRITE",
+    }
+    if out is not None:
+        out.mkdir(parents=True)
+        _write_fit(job, fitted, record, out)
+    return JobResult(job.name, "done", figures=figures, effects=_effects(record, {}), outputs=_manifest(out))
+
+
+def _converted(job: Job, conversion: Conversion, out: Path | None) -> JobResult:
+    record = record_of(conversion)
+    fit = record.get("fit")
+    figures = {
+        **_identity(conversion.robot),
+        **({} if fit is None else _fit_figures(fit)),
+        "programs": True,
+        "direction": record["direction"],
+        "edits": len(record["edits"]),
+        "refused": sorted({f"{item['program']}: {item['code']}" for item in record["refused"]}),
+    }
+    if out is None:
+        rehearse(conversion.files, conversion.correction)
+    else:
+        write_backup(out / PROGRAMS, conversion.files, conversion.correction, record)
+        if conversion.fitted is not None and fit is not None:
+            fit["calibration_hash"] = conversion.calibration.content_hash
+            _write_fit(job, conversion.fitted, fit, out)
+    return JobResult(
+        job.name,
+        "done",
+        figures=figures,
+        effects=_effects(fit or {}, record),
+        edits=[{key: item[key] for key in _EDIT} for item in record["edits"]],
+        outputs=_manifest(out),
+    )
+
+
+#: What the ledger keeps of an edit.
+_EDIT = ("path", "line", "target", "depth", "shift_mm", "turn_deg")
+
+
+def _write_fit(job: Job, fitted: SourceFit, record: Mapping[str, Any], out: Path) -> None:
+    """Write the page, and the calibration where its orientations are read as they are written."""
+    page = fit_page(
+        record,
+        title=f"{job.name}: {fitted.source.robot.name if fitted.source.robot is not None else job.robot.source}",
+        source=job.robot.source,
+        reference=str(job.robot.reference),
+        tolerance=tolerance_of(job.robot.options),
+        issues=[issue.as_json() for issue in fitted.issues],
+    )
+    _write(out / PAGE, page)
+    if not fitted.fit.rereads_source:
+        _write(out / CALIBRATION, precise(fitted.fit).to_json())
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise BadInputError("CANNOT_READ", f"cannot be written: {error.strerror}", path.name) from error
+
+
+def _identity(robot: Robot | None) -> dict[str, Any]:
+    if robot is None:
+        return {}
+    version = robot.machine.facts.get("version")
+    return {
+        "robot": robot.name,
+        "language": robot.language,
+        "model": robot.machine.model,
+        "version": "" if version is None else version.value,
+    }
+
+
+def _fit_figures(record: Mapping[str, Any]) -> dict[str, Any]:
+    heldout = (record.get("heldout") or {}).get("after") or {}
+    return {
+        "kind": record["kind"],
+        "spots": record["n_matched"],
+        "inliers": record["n_inliers"],
+        "before": record["before"]["rms"],
+        "after": record["after"]["rms"],
+        "heldout": heldout.get("rms"),
+        "unexplained": bool((record.get("unexplained") or {}).get("present")),
+    }
+
+
+def _effects(fit: Mapping[str, Any], record: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """What the line keeps of each effect."""
+    written: Sequence[str] = record.get("effects_written", ())
+    return [
+        {
+            **{
+                key: effect.get(key) for key in ("name", "where", "parameters", "named", "not_separated_from", "remedy")
+            },
+            "written": any(label.split()[0] == effect["name"] for label in written),
+        }
+        for effect in fit.get("effects", ())
+    ]
+
+
+def _manifest(out: Path | None) -> dict[str, tuple[str, int]]:
+    """Hash and size of every file of a folder, by path."""
+    if out is None:
+        return {}
+    files = sorted(path for path in out.rglob("*") if path.is_file())
+    contents = ((path.relative_to(out).as_posix(), path.read_bytes()) for path in files)
+    return {path: (hashlib.sha256(data).hexdigest(), len(data)) for path, data in contents}
+
+
+def _words(issue: Issue) -> str:
+    place = ":".join(str(part) for part in (issue.path, issue.line) if part is not None)
+    return f"{place}: {issue.message}" if place else issue.message
+
+
+def _with_time(result: JobResult, seconds: float) -> JobResult:
+    return JobResult(**{**vars(result), "cpu_seconds": seconds})
+
+
+@contextmanager
+def _few_collections() -> Iterator[None]:
+    before = gc.get_threshold()
+    gc.set_threshold(_GARBAGE)
+    try:
+        yield
+    finally:
+        gc.set_threshold(*before)
+        gc.collect()
