@@ -176,7 +176,6 @@ CODES: dict[str, tuple[Level, str]] = {
     "LINE_IS_RUNNING": (_E, "another process is at work on the same output folder"),
     "LEDGER_STOPPED": (_E, "the ledger of a line can no longer be written"),
     "NO_CLUSTER": (_E, "a cluster cannot be used"),
-    "NOTHING_TO_WRITE": (_I, "no program of a robot changes, and none is written"),
     "INPUT_CHANGED": (_E, "an input of a robot changed while it was worked on"),
     "WORKER_LOST": (_E, "the process that worked on a robot ended"),
     "TIMED_OUT": (_E, "a robot took longer than --timeout"),

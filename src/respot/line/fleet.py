@@ -69,8 +69,9 @@ def groups_of(robots: Sequence[Row]) -> list[dict[str, Any]]:
         for robot in fitted:
             for effect in robot["effects"]:
                 found.setdefault(_key(effect), []).append((robot, effect))
-        common = [_common(pairs) for pairs in found.values() if len(pairs) > 1]
-        groups.append({"group": group, "robots": [robot["name"] for robot in fitted], "effects": common})
+        common = [_common(pairs) for pairs in found.values() if len({robot["name"] for robot, _ in pairs}) > 1]
+        told = [effect for effect in common if effect["parameters"]]
+        groups.append({"group": group, "robots": [robot["name"] for robot in fitted], "effects": told})
     return groups
 
 

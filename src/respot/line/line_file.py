@@ -211,7 +211,7 @@ class _Reader:
             file = self._path.absolute().parent / robot
             robot_of(str(file) if file.is_file() or robot.lower().endswith(".toml") else robot)
         except BadInputError as error:
-            raise self._bad(f"robot: {error.issue.message}", section, number, "robot") from error
+            raise self._bad(f"robot = {robot!r}: {error.issue.message}", section, number, "robot") from error
 
     def _reference(self, data: Mapping[str, Any], section: str, number: int) -> tuple[Kind | None, str | None]:
         theory, measured = (self._text(data, key, section, number) for key in ("theory", "measured"))
@@ -260,7 +260,7 @@ class _Reader:
                 continue
             close = get_close_matches(key, known, n=1)
             hint = f"did you mean {close[0]}?" if close else f"there are {', '.join(known)}"
-            line = self._places.line(section, number, key)
+            line = self._places.line(section, number, key) or self._places.line(key)
             raise BadInputError("UNKNOWN_KEY", f"{where} has a key {key!r}: {hint}", str(self._path), line)
 
     def _bad(self, message: str, section: str, number: int, key: str | None = None) -> BadInputError:

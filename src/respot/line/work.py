@@ -134,7 +134,6 @@ def _fitted(job: Job, fitted: SourceFit, out: Path | None) -> JobResult:
         "edits": 0,
         "refused": [],
         "note": "nothing to compensate: the robot goes where its programs say",
-        "note_code": "NOTHING_TO_WRITE",
     }
     if out is not None:
         out.mkdir(parents=True)
@@ -153,6 +152,8 @@ def _converted(job: Job, conversion: Conversion, out: Path | None) -> JobResult:
         "edits": len(record["edits"]),
         "refused": sorted({f"{item['program']}: {item['code']}" for item in record["refused"]}),
     }
+    if record.get("effects_not_written"):
+        figures["note"] = f"not written, for a person to put right: {', '.join(record['effects_not_written'])}"
     if out is None:
         rehearse(conversion.files, conversion.correction)
     else:

@@ -6,6 +6,7 @@ goes to standard error, so that it cannot get between them.
 
 from __future__ import annotations
 
+import gc
 import importlib
 import os
 import pickle
@@ -29,6 +30,7 @@ def main() -> None:
         os.putenv(name, "1")
     for module in preload:
         importlib.import_module(module)
+    gc.freeze()  # what is imported is no garbage: looking it over after each piece of work takes long
     if memory_mb is not None:
         limit_memory(memory_mb)
     _send(outgoing, (True, None))

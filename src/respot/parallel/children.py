@@ -112,11 +112,16 @@ class Child:
             if timed_out.is_set():  # also where the answer came in the same moment
                 self._forget()
 
-    def close(self) -> None:
-        """End the process, whatever it does."""
+    def kill(self) -> None:
+        """End the process from any thread, whatever it does; `call` raises where it waits."""
         self._closed = True
         if self._process is not None:
             self._process.kill()
+
+    def close(self) -> None:
+        """End the process and clear it away; in the thread that calls."""
+        self.kill()
+        self._forget()
 
     def _started(self) -> subprocess.Popen[bytes]:
         # -P: no file of the folder it starts in may pass for a module; a session of its own: Ctrl-C is for the parent
@@ -213,7 +218,7 @@ class ChildPool(Executor):
                 if item is not None:
                     item[0].cancel()
             for child in self._children:
-                child.close()
+                child.kill()
         for _ in self._threads:
             self._queue.put(None)
         if wait:
