@@ -173,7 +173,7 @@ def test_status_while_it_runs_and_a_second_run_on_the_folder(doors, tmp_path):
     record, refusal = seen[:2]
     assert states(record) == {"K": "done", "A": "waiting"}
     assert record["running"].startswith("process ")
-    assert "LINE_IS_RUNNING process " in " ".join(refusal.split(": "))
+    assert "IN_USE process " in " ".join(refusal.split(": "))
     assert "started 20" in refusal
     assert states(migrate(doors, "--status", "-o", out))["A"] == "done"
 
@@ -278,7 +278,7 @@ def test_a_backup_that_changes_while_it_is_read(doors, tmp_path, monkeypatch):
 
     monkeypatch.setattr(work, "convert", meanwhile)
     record = migrate(doors, "-o", tmp_path / "out", code=1)
-    assert record["robots"][0]["error"]["code"] == "INPUT_CHANGED"
+    assert record["robots"][0]["error"]["code"] == "SOURCE_CHANGED"
     assert states(record)["A"] == "done"
 
 

@@ -44,13 +44,13 @@ class OutputFolder:
         Raises
         ------
         BadInputError
-            ``CANNOT_READ``: nothing can be written there.
+            ``CANNOT_WRITE``: nothing can be written there.
         """
         try:
             shutil.rmtree(self.path / WORK, ignore_errors=True)
             self._own.mkdir(parents=True)
         except OSError as error:
-            raise BadInputError("CANNOT_READ", f"cannot be written: {error.strerror}", str(self.path)) from error
+            raise BadInputError("CANNOT_WRITE", f"cannot be written: {error.strerror}", str(self.path)) from error
 
     def unpack(self, name: str, files: Mapping[str, bytes]) -> None:
         """Write a robot's new folder that came as bytes."""
@@ -88,7 +88,7 @@ class OutputFolder:
         Raises
         ------
         BadInputError
-            ``CANNOT_READ``.
+            ``CANNOT_WRITE``.
         """
         place = self._own / name
         try:
@@ -96,7 +96,7 @@ class OutputFolder:
             place.replace(self.path / name)
         except OSError as error:
             message = f"cannot be written: {error.strerror}; what is done is kept: run again"
-            raise BadInputError("CANNOT_READ", message, str(self.path / name)) from error
+            raise BadInputError("CANNOT_WRITE", message, str(self.path / name)) from error
 
     def clear(self) -> None:
         """Take the place for half-done work away."""

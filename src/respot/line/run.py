@@ -124,7 +124,7 @@ def run_line(line: LineFile, out: Path, workers: Workers, *, retry: bool, watch:
     Raises
     ------
     BadInputError
-        ``LINE_IS_RUNNING``, ``ANOTHER_LINE``, ``BAD_LEDGER``, ``LEDGER_STOPPED``, ``OUTPUT_EXISTS``, ``NO_CLUSTER``, or
+        ``IN_USE``, ``ANOTHER_LINE``, ``BAD_LEDGER``, ``LEDGER_STOPPED``, ``OUTPUT_EXISTS``, ``NO_CLUSTER``, or
         nothing can be written.
     """
     folder = OutputFolder(out)
@@ -182,10 +182,10 @@ def _ledger_of(path: Path, line: LineFile) -> Iterator[Ledger]:
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise BadInputError("CANNOT_READ", f"cannot be written: {error.strerror}", str(path)) from error
+        raise BadInputError("CANNOT_WRITE", f"cannot be written: {error.strerror}", str(path)) from error
     lock = Lock(path)
     if not lock.take():
-        raise BadInputError("LINE_IS_RUNNING", f"{_who(path)} is at work on it: wait, or end it", str(path))
+        raise BadInputError("IN_USE", f"{_who(path)} is at work on it: wait, or end it", str(path))
     try:
         ledger = Ledger(path)
         try:
@@ -297,7 +297,7 @@ def _settle(result: JobResult, folder: OutputFolder) -> JobResult:
             folder.unpack(result.name, result.files)
         folder.put(result.name)
     except OSError as error:
-        return JobResult(result.name, "failed", "CANNOT_READ", f"its folder cannot be written: {error.strerror}")
+        return JobResult(result.name, "failed", "CANNOT_WRITE", f"its folder cannot be written: {error.strerror}")
     return result
 
 

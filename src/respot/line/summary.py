@@ -33,7 +33,7 @@ def write_summary(line: LineFile, rows: Iterable[Mapping[str, Any]], folder: Out
     Raises
     ------
     BadInputError
-        ``CANNOT_READ``: one cannot be written.
+        ``CANNOT_WRITE``: one cannot be written.
     """
     record = line_record(line.name, rows)
     folder.write(RECORD, json.dumps(record, indent=1, ensure_ascii=False, allow_nan=False) + "\n")

@@ -73,7 +73,7 @@ def _guarded(job: Job, out: Path | None) -> JobResult:
             result = _work(job, out)
         if inputs_changed(job):
             message = "a file changed while it was read: run again when nobody writes to it"
-            return JobResult(job.name, "failed", "INPUT_CHANGED", message)
+            return JobResult(job.name, "failed", "SOURCE_CHANGED", message)
         return result
     except MemoryError as error:
         return _out_of_memory(job, error)
@@ -194,7 +194,7 @@ def _write(path: Path, text: str) -> None:
     try:
         path.write_text(text, encoding="utf-8", newline="\n")
     except OSError as error:
-        raise BadInputError("CANNOT_READ", f"cannot be written: {error.strerror}", path.name) from error
+        raise BadInputError("CANNOT_WRITE", f"cannot be written: {error.strerror}", path.name) from error
 
 
 def _identity(robot: Robot | None) -> dict[str, Any]:
