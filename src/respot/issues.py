@@ -111,6 +111,11 @@ CODES: dict[str, tuple[Level, str]] = {
     "NOT_FRESH": (_W, "a calibration is held against the very measurements that it was fitted to"),
     "OUT_OF_TOLERANCE": (_W, "a spot is farther from where it is predicted than the tolerance"),
     "PROMISE_NOT_KEPT": (_W, "fresh measurements depart from a calibration by more than its held-out error allows"),
+    # planning measurements
+    "FEW_CANDIDATES": (_W, "fewer spots are left to measure than were asked for"),
+    "NOTHING_TO_SEPARATE": (_I, "a calibration holds no rivals: spots are chosen that make it surer"),
+    "NOT_SEPARABLE": (_W, "no spots of the program tell two explanations apart"),
+    "NOT_PLANNED": (_W, "what an explanation follows is not known of the spots that may be measured"),
     # reading programs
     "OPAQUE_STATEMENT": (_W, "a statement that no rule knows; it is kept as it is"),
     "UNBALANCED_BLOCK": (_W, "a block or fold is opened and not closed, or closed and not opened"),

@@ -17,6 +17,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from respot.calibration.effects.catalogue import MECHANISMS
 from respot.calibration.effects.moved import at_tip, missing, moved, unmoved
 from respot.calibration.effects.term import Term
+from respot.calibration.information import Information
 from respot.calibration.observations import Observations
 from respot.calibration.precision import Precision
 from respot.kinematics.robot_file import robot_from_record
@@ -86,6 +87,8 @@ class Calibration:
         Kinematics that the effects of the arm were fitted with, as `respot.kinematics.robot_file.robot_record`.
     precision : Precision or None
         How sure it is: not part of the content hash, and kept by a hash of its own in the file. None where nobody said.
+    information : Information or None
+        What its spots tell of effects and their rivals, for plans of further spots; kept as the precision is.
 
     Raises
     ------
@@ -106,6 +109,7 @@ class Calibration:
     terms: tuple[Term, ...] = ()
     values: tuple[Array, ...] = ()
     robot: Mapping[str, Any] | None = None
+    information: Information | None = None
 
     def __post_init__(self) -> None:
         rotation, translation = np.array(self.rotation, dtype=np.float64), np.array(self.translation, dtype=np.float64)
@@ -270,6 +274,7 @@ class Calibration:
             provenance={**_exchanged_sides(self.provenance), "inverse_of": self.content_hash},
             tool_offset=None if self.tool_offset is None else -self.tool_offset,
             precision=self.precision.inverted(self) if self.precision and self.tool_offset is None else None,
+            information=None,
         )
 
     def compose(self, other: Calibration, *, same_middle: bool = False) -> Calibration:
@@ -359,6 +364,7 @@ class Calibration:
     def to_json(self) -> str:
         """JSON text of one of the three schemas; equal calibrations give equal text."""
         sure = None if self.precision is None else self.precision.to_dict()
+        known = None if self.information is None else self.information.to_dict()
         record = {
             **self._content(),
             "method": self.method,
@@ -366,6 +372,7 @@ class Calibration:
             "ids": list(self.ids),
             "provenance": dict(self.provenance),
             **({} if sure is None else {"precision": sure, "precision_hash": _sha256(sure)}),
+            **({} if known is None else {"information": known, "information_hash": _sha256(known)}),
         }
         return json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
@@ -383,6 +390,7 @@ class Calibration:
         record = _parse(text)
         try:
             offset, sure, effects = record.get("tool_offset"), record.get("precision"), record.get("effects", [])
+            known = record.get("information")
             result = cls(
                 rotation=np.array(record["rotation"], dtype=np.float64),
                 translation=np.array(record["translation"], dtype=np.float64),
@@ -396,11 +404,13 @@ class Calibration:
                 terms=tuple(_term(each) for each in effects),
                 values=tuple(np.array(each["values"], dtype=np.float64) for each in effects),
                 robot=None if record.get("robot") is None else dict(record["robot"]),
+                information=None if known is None else Information.from_dict(known),
             )
             schema, own = result._content()["schema"], result.content_hash
             if result.robot is not None:
                 robot_from_record(result.robot)
             stated, kept = record["hash"], None if sure is None else record["precision_hash"]
+            kept_beside = None if known is None else record["information_hash"]
         except KeyError as error:
             raise CalibrationError("CALIBRATION_INCOMPLETE", f"the calibration lacks the entry {error}") from error
         except CalibrationError:
@@ -412,7 +422,8 @@ class Calibration:
         if record["schema"] != schema:
             message = f"says schema {record['schema']!r}, but what it holds is {schema!r}: it was changed; fit it again"
             raise CalibrationError("CALIBRATION_SCHEMA", message)
-        if stated != own or (result.precision and kept != _sha256(result.precision.to_dict())):
+        changed = stated != own or (result.precision and kept != _sha256(result.precision.to_dict()))
+        if changed or (result.information and kept_beside != _sha256(result.information.to_dict())):
             raise CalibrationError(
                 "CALIBRATION_CHANGED",
                 "the calibration does not match the hash it carries: it was changed after it was saved; fit it again",

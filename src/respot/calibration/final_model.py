@@ -19,6 +19,7 @@ from respot.calibration import effects_model
 from respot.calibration.calibration import Calibration
 from respot.calibration.causes import Causes
 from respot.calibration.effects import tool_model, tool_offset
+from respot.calibration.information import information_of
 from respot.calibration.precision import direction_share, with_precision
 from respot.calibration.spot_fit import Orientations, SpotFit, Weights
 from respot.calibration.uncertainty import (
@@ -281,6 +282,8 @@ def _left_out(
 def precise(fit: SpotFit) -> Calibration:
     """Return the calibration of a fit with its precision: `with_precision`, and as the rigid part was fitted.
 
+    Where effects were accepted it keeps what its spots tell of them and their rivals as well.
+
     A bootstrap refits by plain least squares and is refused for other weights: the residuals are not kept.
 
     Raises
@@ -288,7 +291,7 @@ def precise(fit: SpotFit) -> Calibration:
     CalibrationError
         As `SpotFit.calibration`.
     """
-    model = with_precision(fit)
+    model = replace(with_precision(fit), information=information_of(fit))
     if model.precision is None or (fit.weighted is None and fit.oriented is None):
         return model
     noise, free = model.precision.noise, model.precision.degrees_of_freedom

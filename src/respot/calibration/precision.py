@@ -130,11 +130,27 @@ class Precision:
         ValueError
             Other columns than there are parameters of effects.
         """
+        rows = self.rows_of(calibrated, columns)
+        result: Array = np.einsum("nik,kl,njl->nij", rows, self.covariance, rows)
+        return result if self.unknown is None else result + self.unknown
+
+    def rows_of(self, calibrated: Array, columns: Array | None) -> Array:
+        """Shifts (n, 3, 6 + k) of predicted positions per unit of each parameter, reference frame.
+
+        Parameters
+        ----------
+        calibrated, columns
+            As `covariance_of`.
+
+        Raises
+        ------
+        ValueError
+            Other columns than there are parameters of effects.
+        """
         rows = _rows(calibrated - self.centroid, columns)
         if rows.shape[2] != self.parameters:
             raise ValueError("the model has effects: their columns are needed, one for each parameter")
-        result: Array = np.einsum("nik,kl,njl->nij", rows, self.covariance, rows)
-        return result if self.unknown is None else result + self.unknown
+        return rows
 
     def leverage_of(self, covariance: Array) -> Array:
         """Leverage (n,): what the parameters add to the variance of a new spot, as a share of the noise's variance.

@@ -133,7 +133,7 @@ def predict_spots(
         radii = _bootstrap(calibration, given, share, bootstrap, seed)
     if sure is None:
         return Prediction(names, moved, turned)
-    covariance = sure.covariance_of(moved, _columns_of(calibration, given, rotations, turned, observations))
+    covariance = sure.covariance_of(moved, columns_at(calibration, given, rotations, turned, observations))
     if not bootstrap:
         free = sure.degrees_of_freedom
         radii = ball_radius(covariance, free, share), ball_radius(covariance + sure.noise, free, share)
@@ -144,14 +144,24 @@ def predict_spots(
     return Prediction(names, moved, turned, *radii, sure.leverage_of(covariance), extrapolated)
 
 
-def _columns_of(
+def columns_at(
     calibration: Calibration,
     points: Array,
     rotations: Rotation | None,
     turned: Rotation | None,
     observations: Observations | None,
 ) -> Array | None:
-    """Shift (n, 3, k) of each spot per unit of each parameter of its effects, reference frame; None without effects."""
+    """Shift (n, 3, k) of each spot per unit of each parameter of its effects, reference frame; None without effects.
+
+    Parameters
+    ----------
+    calibration : Calibration
+    points, rotations
+        Source frame [mm].
+    turned : Rotation of n, or None
+        Tool orientations in the reference frame.
+    observations : Observations of n, or None
+    """
     if calibration.terms and observations is not None:
         return calibration.effect_columns(replace(observations, positions=points, rotations=rotations))
     return np.asarray(turned.as_matrix()) if calibration.tool_offset is not None and turned is not None else None
@@ -259,13 +269,17 @@ def predict_source(
             used, spots.ids, spots.positions, spots.rotations, observations, bootstrap=bootstrap, seed=seed
         )
     except CalibrationError as error:
-        code = "NO_ORIENTATION" if error.code == "CALIBRATION_NEEDS_ORIENTATION" else "BAD_CALIBRATION"
-        path = source_path if code == "NO_ORIENTATION" else calibration_path
-        raise BadInputError(code, str(error), str(path)) from error
+        raise refused(error, source_path, calibration_path) from error
     if prediction.ci95 is None:
         message = "does not say how sure it is, so no intervals: fit it again with this version"
         issues.append(Issue("NO_INTERVAL", message, str(calibration_path)))
     return SourcePrediction(source, calibration, prediction, [*issues, *extrapolated(prediction)])
+
+
+def refused(error: CalibrationError, source_path: Path, calibration_path: Path) -> BadInputError:
+    """What is said where a calibration cannot predict the spots of a source."""
+    code = "NO_ORIENTATION" if error.code == "CALIBRATION_NEEDS_ORIENTATION" else "BAD_CALIBRATION"
+    return BadInputError(code, str(error), str(source_path if code == "NO_ORIENTATION" else calibration_path))
 
 
 def read_for(calibration: Calibration, path: Path, options: UseOptions) -> tuple[Source, list[Issue]]:

@@ -10,7 +10,21 @@ from typing import Annotated
 import typer
 
 from respot import __version__
-from respot.cli import check, convert, demo, diff, fit, inspect, migrate, predict, robots, simulate, undo, validate
+from respot.cli import (
+    check,
+    convert,
+    demo,
+    diff,
+    fit,
+    inspect,
+    migrate,
+    plan,
+    predict,
+    robots,
+    simulate,
+    undo,
+    validate,
+)
 
 app = typer.Typer(
     name="respot",
@@ -25,6 +39,7 @@ _COMMANDS = {
     "fit": fit,
     "predict": predict,
     "validate": validate,
+    "plan": plan,
     "convert": convert,
     "undo": undo,
     "diff": diff,

@@ -22,6 +22,7 @@ SEPARATED = 6.0
 CLEAR = 10.0
 """It loses clearly, so that the cause may be named, when it is larger by this: 150 to 1."""
 _SHOWN = 6
+_MOST_NEAR = 16
 _CONTAINED = 1e-3
 
 
@@ -36,11 +37,14 @@ class RivalTable:
         The best others: term, held-out errors, by how much the criterion is larger, and whether they are separated.
     without : HeldOut
         Held-out errors of the model without the term.
+    near : tuple of (Term, float)
+        All that do not lose clearly, the nearest first, shown or not: term, and by how much the criterion is larger.
     """
 
     term: Term
     rivals: tuple[tuple[Term, HeldOut, float, bool], ...]
     without: HeldOut
+    near: tuple[tuple[Term, float], ...] = ()
 
     @property
     def not_separated(self) -> tuple[Term, ...]:
@@ -86,8 +90,10 @@ def rival_table(
     # of the same finding the form does not matter
     seen = {own.key}
     found: list[tuple[Term, HeldOut, float, bool]] = []
+    near: list[tuple[Term, float]] = []
     for other in np.argsort(criteria).tolist():
-        if not np.isfinite(criteria[other]) or len(found) == _SHOWN:
+        more = len(near) < _MOST_NEAR and criteria[other] <= CLEAR
+        if not np.isfinite(criteria[other]) or (len(found) == _SHOWN and not more):
             break
         term = bank.terms[other]
         if term.key in seen:
@@ -96,11 +102,15 @@ def rival_table(
         apart = float(criteria[other])
         if _holds(bank, bank.span([*rest.chosen, other], sigma), own_rows, rest.rank):
             continue
+        if more:
+            near.append((term, apart))
+        if len(found) == _SHOWN:
+            continue
         others = [bank.terms[i] for i in rest.chosen] + [term]
         trial = fit_jointly(observations, reference, others, fit.inliers)
         found.append((term, heldout(trial, folds, skip), apart, apart > SEPARATED))
     bare = fit_jointly(observations, reference, [bank.terms[i] for i in rest.chosen], fit.inliers)
-    return RivalTable(own, tuple(found), heldout(bare, folds, skip))
+    return RivalTable(own, tuple(found), heldout(bare, folds, skip), tuple(near))
 
 
 def _holds(bank: Bank, span: Span, contained: Span, start: int) -> bool:
