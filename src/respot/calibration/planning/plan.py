@@ -48,6 +48,8 @@ class PairOutlook:
         Expected with every spot that is left.
     promised, possible : bool
         Whether the planned spots, or all, are expected to separate them clearly, nine times of ten.
+    advice : str
+        What measurement tells the effect from what it is confounded with.
     """
 
     names: Names
@@ -56,6 +58,7 @@ class PairOutlook:
     with_all: float
     promised: bool
     possible: bool
+    advice: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +79,8 @@ class PlannedSpot:
     separates : tuple of pairs of str
         What is promised with this spot and those before it, and is not without it.
     buys : tuple of (pair of str, float, float)
-        Pairs that it brings further apart, most first: standard deviations before and after it.
+        Pairs that are not separated before it, and that it brings further apart, most first: standard deviations before
+        and after it.
     """
 
     id: str
@@ -144,6 +148,7 @@ class Plan:
                     "with_all": pair.with_all,
                     "separated": pair.promised,
                     "separable": pair.possible,
+                    "measure": pair.advice,
                 }
                 for pair in self.pairs
             ],
@@ -265,17 +270,15 @@ def _chosen(
             float(np.sqrt(max(pair.apart + with_all[place], 0.0))),
             bool(safe[-1][place]),
             bool(possible[place]),
+            MECHANISMS[pair.effect.effect].separates,
         )
         for place, pair in enumerate(pairs)
     )
     found = []
     for (before, after), (one, other) in zip(pairwise(sigmas), pairwise(safe), strict=True):
         separates = tuple(pairs[place].names for place in np.flatnonzero(other & ~one).tolist())
-        most = [
-            place
-            for place in np.argsort(before - after, kind="stable").tolist()
-            if after[place] - before[place] > _BUYS
-        ]
+        nearer = ~one & (after - before > _BUYS)
+        most = [place for place in np.argsort(before - after, kind="stable").tolist() if nearer[place]]
         buys = tuple((pairs[place].names, float(before[place]), float(after[place])) for place in most)
         found.append((separates, buys))
     return order, outlooks, found
@@ -376,14 +379,13 @@ def _issues(calibration: Calibration, plan: Plan, count: int, source: Source) ->
             "tells columns, --robot the arm"
         )
         issues.append(Issue("NOT_PLANNED", message, path))
-    effects = dict.fromkeys(pair.names[0] for pair in plan.pairs if not pair.possible)
-    for effect in effects:
+    hopeless = {pair.names[0]: pair.advice for pair in plan.pairs if not pair.possible}
+    for effect, advice in hopeless.items():
         pairs = [pair for pair in plan.pairs if pair.names[0] == effect and not pair.possible]
         shown = ", ".join(f"{pair.names[1]} ({pair.with_all:.1f} sigma)" for pair in pairs[:_SHOWN])
         more = f" and {len(pairs) - _SHOWN} more" if len(pairs) > _SHOWN else ""
         message = (
-            f"all {plan.candidates} spots that are left do not tell {effect} from {shown}{more}. What would: "
-            f"{MECHANISMS[effect.split()[0]].separates}"
+            f"all {plan.candidates} spots that are left do not tell {effect} from {shown}{more}. What would: {advice}"
         )
         issues.append(Issue("NOT_SEPARABLE", message, path))
     return issues
