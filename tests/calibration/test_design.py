@@ -6,13 +6,14 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from respot.calibration.planning.design import Design, Question, whitened
 
-SPOTS = 9
+SPOTS = 7
 WIDTH = 5
+slow = settings(max_examples=25, deadline=None)
 
 
 def drawn(seed: int, spots: int = SPOTS, width: int = WIDTH):
@@ -40,6 +41,7 @@ def left_by_hand(normal, rows, field, chosen) -> float:
     return float(np.sum((wanted - design / scale @ answer) ** 2))
 
 
+@slow
 @given(st.integers(0, 10_000), st.lists(st.integers(0, SPOTS - 1), min_size=1, max_size=SPOTS, unique=True))
 def test_squares_are_those_of_plain_least_squares(seed, chosen):
     normal, rows, field = drawn(seed)
@@ -51,6 +53,7 @@ def test_squares_are_those_of_plain_least_squares(seed, chosen):
     assert Question(whitened(normal, rows)[0], field).with_all() == pytest.approx(everything, rel=1e-6)
 
 
+@slow
 @given(st.integers(0, 10_000), st.integers(0, SPOTS - 1), st.integers(0, SPOTS - 1))
 def test_a_spot_that_is_taken_out_again_leaves_nothing(seed, kept, row):
     one, other = questions(seed)[0], questions(seed)[0]
@@ -63,6 +66,7 @@ def test_a_spot_that_is_taken_out_again_leaves_nothing(seed, kept, row):
     np.testing.assert_allclose(one.error, other.error, atol=1e-8)
 
 
+@slow
 @given(st.integers(0, 10_000), st.integers(0, SPOTS - 1))
 def test_a_duplicate_helps_no_more_than_a_repeat_and_less_than_the_first_time(seed, row):
     normal, rows, field = drawn(seed)
@@ -84,6 +88,7 @@ def test_a_duplicate_helps_no_more_than_a_repeat_and_less_than_the_first_time(se
     assert repeated.found - once <= once + 1e-9
 
 
+@slow
 @given(st.integers(0, 10_000), st.integers(1, 4))
 def test_no_single_exchange_makes_a_choice_better(seed, count):
     design = Design(questions(seed), [0.0, 0.0])
@@ -95,12 +100,14 @@ def test_no_single_exchange_makes_a_choice_better(seed, count):
             assert total(seed, [other if each == row else each for each in rows]) <= best + 1e-6
 
 
+@slow
 @given(st.integers(0, 10_000))
 def test_a_choice_of_three_is_nearly_the_best_of_all(seed):
     best = max(total(seed, list(rows)) for rows in combinations(range(SPOTS), 3))
     assert total(seed, Design(questions(seed), [0.0, 0.0]).choose(3)) >= 0.9 * best
 
 
+@slow
 @given(st.integers(0, 10_000), st.randoms(use_true_random=False))
 def test_candidates_may_come_in_any_order(seed, random):
     normal, rows, field = drawn(seed)
