@@ -8,6 +8,7 @@ quaternion, scalar first (facts: rapid.md section 2.1).
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -120,6 +121,21 @@ def quaternion_from_rotation(rotation: Rotation, near: npt.ArrayLike | None = No
 def pose(position: npt.ArrayLike, rotation: Rotation) -> RigidTransform:
     """Pose of a position (3,) or (n, 3) in mm and a rotation of the same count."""
     return RigidTransform.from_components(np.asarray(position, dtype=float), rotation)
+
+
+def batch(poses: Sequence[RigidTransform]) -> RigidTransform:
+    """Return n > 0 poses as one batch, bit by bit as they are; many may be the same few objects, such as bases."""
+    rows: dict[int, int] = {}
+    index = [rows.setdefault(id(item), len(rows)) for item in poses]
+    each = {id(item): item for item in poses}
+    return RigidTransform.concatenate([each[key] for key in rows])[np.array(index)]
+
+
+def replaced(poses: RigidTransform, rows: Sequence[int], others: RigidTransform) -> RigidTransform:
+    """Return a batch with others in some of its rows."""
+    index = np.arange(len(poses))
+    index[rows] = len(poses) + np.arange(len(rows))
+    return RigidTransform.concatenate([poses, others])[index]
 
 
 def distance_mm(first: RigidTransform, second: RigidTransform) -> Array:

@@ -19,6 +19,7 @@ from respot.issues import BadInputError, Issue
 from respot.languages import LANGUAGES
 from respot.languages.profile_file import read_profile
 from respot.program.moves import Move
+from respot.program.poses import spot_poses
 from respot.program.robot import Robot
 from respot.tables import Table, read_table
 from respot.tolerance import SAME_POSITION_MM
@@ -186,10 +187,10 @@ def spots_of_robot(robot: Robot, reference_ids: Collection[str] = (), pattern: s
             ids.append(spot_id)
             kept.append(moves[0])
     issues += _drop_other_frame(ids, kept)
-    poses = [pose for move in kept if (pose := move.spot_pose) is not None]
-    positions = np.array([pose.translation for pose in poses]).reshape(-1, 3)
-    rotations = Rotation.concatenate([pose.rotation for pose in poses]) if poses else None
-    return SpotTable(ids, positions, rotations, kept, issues)
+    if not kept:
+        return SpotTable(ids, np.empty((0, 3)), None, kept, issues)
+    poses = spot_poses(kept)
+    return SpotTable(ids, np.asarray(poses.translation), poses.rotation, kept, issues)
 
 
 def _drop_other_frame(ids: list[str], moves: list[Move]) -> list[Issue]:
@@ -215,7 +216,7 @@ def _doubt(spot_id: str, moves: Sequence[Move]) -> Issue | None:
     if first.unknown:
         code = first.codes[0] if first.codes else "RUN_TIME_POSE"
         return Issue(code, f"{spot_id}: {first.unknown}", first.path, first.line)
-    if first.spot_pose is None:
+    if not first.has_spot_pose:
         doubt = next((doubt for doubt in first.doubts if doubt.code != "UNKNOWN_TOOL"), None)
         if doubt is not None:
             return Issue(doubt.code, f"{spot_id}: {doubt.text}", first.path, first.line)

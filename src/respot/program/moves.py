@@ -33,7 +33,7 @@ class LabelKind(StrEnum):
     ROUTINE = "routine"  # name of the routine
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Label:
     """A text about a motion in which a spot ID may stand."""
 
@@ -143,6 +143,13 @@ class Move:
     def codes(self) -> tuple[str, ...]:
         """Codes of what is not known of the motion, each once."""
         return tuple(dict.fromkeys(doubt.code for doubt in self.doubts))
+
+    @property
+    def has_spot_pose(self) -> bool:
+        """Whether `spot_pose` is known."""
+        if self.target is None or not self.target.components or self.tool_offset is None:
+            return False
+        return (self.offset is None or self.offset.literal) and self.base2spots is not None
 
     @property
     def _pose(self) -> RigidTransform | None:

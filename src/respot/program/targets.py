@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from array import array
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from enum import StrEnum
 from functools import cached_property
+from itertools import chain
+from math import isfinite
 
 from scipy.spatial.transform import RigidTransform
 
@@ -14,12 +17,59 @@ from respot.geometry import pose, rotation_from_abc, rotation_from_quaternion
 from respot.source import Span
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Number:
     """A number of a program: its exact value and its place, sign included."""
 
     value: Decimal
     span: Span
+
+
+class LiteralNumbers(Mapping[str, Number]):
+    """Numbers of a literal by field; exact values are made when they are asked for: a large backup has millions.
+
+    Parameters
+    ----------
+    text : str
+        The file.
+    names : tuple of str
+        The fields, in their order, each once.
+    spans : sequence of tuple
+        Place of the number of each field.
+
+    Raises
+    ------
+    ValueError
+        A text is no number that a controller holds, such as 1E400.
+    """
+
+    __slots__ = ("_names", "_places", "_text", "_values")
+
+    def __init__(self, text: str, names: tuple[str, ...], spans: Sequence[Span]) -> None:
+        self._text = text
+        self._names = names
+        self._places = array("I", chain.from_iterable(spans))
+        self._values = array("d", [float(text[start:end]) for start, end in spans])
+        if not all(map(isfinite, self._values)):
+            raise ValueError("a number is not finite")
+
+    def value(self, name: str) -> float | None:
+        """Value of a field, None where there is none."""
+        names = self._names
+        return self._values[names.index(name)] if name in names else None
+
+    def __getitem__(self, name: str) -> Number:
+        if name not in self._names:
+            raise KeyError(name)
+        index = self._names.index(name)
+        start, end = self._places[2 * index : 2 * index + 2]
+        return Number(Decimal(self._text[start:end]), (start, end))
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
 
 
 class TargetKind(StrEnum):
@@ -86,6 +136,8 @@ class Target:
 
     def number(self, name: str) -> float | None:
         """Value of a field, None where the literal lacks it."""
+        if isinstance(self.numbers, LiteralNumbers):
+            return self.numbers.value(name)
         found = self.numbers.get(name)
         return None if found is None else float(found.value)
 

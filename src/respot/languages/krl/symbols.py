@@ -10,12 +10,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from respot.issues import Issue
 from respot.languages.literals import number_of
-from respot.program.statement import Node, Statement
-from respot.program.targets import Number
+from respot.program.statement import Branch, Leaf, Node, Statement
+from respot.program.targets import LiteralNumbers, Number
 from respot.source import Span
 
 #: Value of a KRL expression: a number, the text of a string, name or enum constant, or an aggregate by member.
@@ -38,11 +38,15 @@ class Aggregate:
 
     def number(self, name: str) -> float | None:
         """Value of a numeric member, else None."""
+        if isinstance(self.members, LiteralNumbers):
+            return self.members.value(name)
         value = self.members.get(name)
         return float(value.value) if isinstance(value, Number) else None
 
-    def numbers(self) -> dict[str, Number]:
+    def numbers(self) -> Mapping[str, Number]:
         """Return the numeric members."""
+        if isinstance(self.members, LiteralNumbers):
+            return self.members
         return {name: value for name, value in self.members.items() if isinstance(value, Number)}
 
     def __str__(self) -> str:
@@ -130,6 +134,9 @@ def value_of(node: Node) -> Value:
         return number
     if node.kind == "aggregate":
         names = node.tokens("NAME")
+        numbers = _numbers(node)
+        if numbers is not None:
+            return Aggregate(numbers, names[0].text.upper() if names else "", node.span)
         members: dict[str, Value] = {}
         for member in node.all("member"):
             name = member.tokens("NAME")[0].text.upper()
@@ -139,6 +146,60 @@ def value_of(node: Node) -> Value:
             members[name] = value_of(nodes[-1])
         return Aggregate(members, names[0].text.upper() if names else "", node.span)
     return node.text
+
+
+class _Flat(NamedTuple):
+    """Where names and numbers of an aggregate of plain numbers stand among the tokens of its statement."""
+
+    names: tuple[int, ...]
+    numbers: tuple[Span, ...]
+
+
+#: By `id` of the branch, which is kept so that no other gets its `id`; and the names that members had so far.
+_FLAT: dict[int, tuple[Branch, _Flat | None]] = {}
+_NAMES: dict[tuple[str, ...], tuple[str, ...]] = {}
+_MOST_KEPT = 10_000
+
+
+def _numbers(node: Node) -> LiteralNumbers | None:
+    """Members of an aggregate all of which are plain numbers, as nearly all points are; None for any other."""
+    branch = node.branch
+    known = _FLAT.get(id(branch))
+    if known is None:
+        if len(_FLAT) > _MOST_KEPT:
+            _FLAT.clear()
+        known = _FLAT[id(branch)] = (branch, _flat(branch))
+    flat = known[1]
+    if flat is None:
+        return None
+    text, tokens = node.source, node.token_spans
+    spans = [(tokens[first][0], tokens[last][1]) for first, last in flat.numbers]
+    written = tuple([text[slice(*tokens[name])].upper() for name in flat.names])
+    names = _NAMES.get(written)
+    if names is None:
+        if len(_NAMES) > _MOST_KEPT:
+            _NAMES.clear()
+        names = _NAMES[written] = written
+    try:
+        return LiteralNumbers(text, names, spans) if len(set(names)) == len(names) else None
+    except ValueError:
+        return None
+
+
+def _flat(branch: Branch) -> _Flat | None:
+    names: list[int] = []
+    numbers: list[Span] = []
+    for member in branch.children:
+        if isinstance(member, Leaf):  # the type, if it is written
+            continue
+        name, value = member.children[0], member.children[-1]
+        if len(member.children) != 2 or not isinstance(name, Leaf) or not isinstance(value, Branch):
+            return None
+        if value.kind not in ("number", "signed"):
+            return None
+        names.append(name.position)
+        numbers.append((value.first, value.last))
+    return _Flat(tuple(names), tuple(numbers)) if names else None
 
 
 def _bits(node: Node) -> Number | None:

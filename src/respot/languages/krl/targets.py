@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from respot.languages.krl.symbols import Aggregate, Symbol
 from respot.languages.literals import TargetTable
 from respot.program.targets import Target, TargetKind
@@ -37,12 +39,18 @@ class Targets(TargetTable):
                 column=column,
                 span=aggregate.span,
                 numbers=aggregate.numbers(),
-                fields=frozenset(aggregate.members),
+                fields=_fields(tuple(aggregate.members)),
                 components=found,
                 unknown="" if found or kind is TargetKind.JOINTS else "not all of X Y Z A B C are numbers",
                 declared=declared,
             )
         return self._targets[key]
+
+
+@lru_cache
+def _fields(names: tuple[str, ...]) -> frozenset[str]:
+    """Return the names as a set, one for all the points that have the same."""
+    return frozenset(names)
 
 
 def _kind(aggregate: Aggregate) -> TargetKind | None:

@@ -6,7 +6,7 @@ else is none (facts: rapid.md 1.4, 1.5).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from decimal import Decimal, InvalidOperation
 from math import isfinite, sqrt
@@ -16,7 +16,7 @@ from respot.languages.literals import TargetTable
 from respot.languages.rapid.records import BUILT_IN, JOINTS, POSES, POSITIONS, Fields
 from respot.languages.rapid.symbols import Symbol
 from respot.program.statement import Branch, Leaf, Node
-from respot.program.targets import Number, Target, TargetKind
+from respot.program.targets import LiteralNumbers, Number, Target, TargetKind
 from respot.source import SourceText, Span
 from respot.tolerance import QUATERNION_NORM
 
@@ -33,37 +33,11 @@ _DEEPEST = 12
 
 
 class _Place(NamedTuple):
-    """Where the numbers of a literal stand among the tokens of its statement: field, first and last token."""
+    """Where the numbers of a literal stand among the tokens of its statement: first and last token of each field."""
 
     kind: TargetKind
-    numbers: tuple[tuple[str, int, int], ...]
-
-
-class _Numbers(Mapping[str, Number]):
-    """Numbers of a literal by field, made when they are asked for: a large backup has millions."""
-
-    __slots__ = ("_made", "_spans", "_text")
-
-    def __init__(self, text: str, spans: tuple[tuple[str, Span], ...]) -> None:
-        self._text = text
-        self._spans = spans
-        self._made: dict[str, Number] | None = None
-
-    @property
-    def _numbers(self) -> dict[str, Number]:
-        if self._made is None:
-            found = ((name, _number(self._text, span)) for name, span in self._spans)
-            self._made = {name: number for name, number in found if number is not None}
-        return self._made
-
-    def __getitem__(self, name: str) -> Number:
-        return self._numbers[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._numbers)
-
-    def __len__(self) -> int:
-        return len(self._numbers)
+    fields: tuple[str, ...]
+    tokens: tuple[Span, ...]
 
 
 #: What keeps the original of a touched-up target, and how its name begins (facts: rapid.md 2.4).
@@ -167,14 +141,12 @@ class Targets(TargetTable):
 
     def _make(self, name: str, path: str, node: Node, span: Span, place: _Place, declared: bool) -> Target:
         tokens, text = node.token_spans, node.source
-        spans = tuple([(field, (tokens[first][0], tokens[last][1])) for field, first, last in place.numbers])
-        numbers = _Numbers(text, spans)
+        spans = [(tokens[first][0], tokens[last][1]) for first, last in place.tokens]
+        numbers = _numbers(text, place.fields, spans)
         components: tuple[float, ...] = ()
         unknown = ""
         if place.kind is TargetKind.POSE:
-            components = _components(text, spans) or tuple(
-                float(numbers[field].value) for field in _COMPONENTS if field in numbers
-            )
+            components = _components(numbers)
             unknown = _doubt(components)
         line, column = self.place(path, span[0])
         return Target(
@@ -214,13 +186,13 @@ def _place(branch: Branch, kind: str) -> _Place | None:
         groups = _GROUPS[found]
         if len(items) == len(groups) and all(map(_fits, items, groups, [bool(kind)] * len(groups))):
             numbers = [
-                (name, part.first, part.last)
+                (name, (part.first, part.last))
                 for group, item in zip(groups, items, strict=True)
                 if item.kind == "aggregate"
                 for name, part in zip(group, _branches(item), strict=True)
                 if _is_number(part)
             ]
-            return _Place(found, tuple(numbers))
+            return _Place(found, tuple(name for name, _ in numbers), tuple(tokens for _, tokens in numbers))
     return None
 
 
@@ -242,23 +214,29 @@ def _is_number(branch: Branch) -> bool:
     return branch.kind == "number"
 
 
+def _numbers(text: str, fields: tuple[str, ...], spans: Sequence[Span]) -> Mapping[str, Number]:
+    """Numbers of a literal; what no controller holds as a number, such as 1E400, is left out."""
+    try:
+        return LiteralNumbers(text, fields, spans)
+    except ValueError:
+        found = ((name, _number(text, span)) for name, span in zip(fields, spans, strict=True))
+        return {name: number for name, number in found if number is not None}
+
+
+def _components(numbers: Mapping[str, Number]) -> tuple[float, ...]:
+    """Position and orientation as the literal says them."""
+    if isinstance(numbers, LiteralNumbers):
+        found = map(numbers.value, _COMPONENTS)
+        return tuple([value for value in found if value is not None])
+    return tuple(float(numbers[field].value) for field in _COMPONENTS if field in numbers)
+
+
 def _number(text: str, span: Span) -> Number | None:
     try:
         value = Decimal("".join(text[slice(*span)].split()))
     except InvalidOperation:
         return None
-    return Number(value, span) if isfinite(float(value)) else None  # no controller holds 1E400
-
-
-def _components(text: str, spans: tuple[tuple[str, Span], ...]) -> tuple[float, ...]:
-    """Position and orientation as the literal says them; empty unless all are plain numbers."""
-    if len(spans) < len(_COMPONENTS) or spans[6][0] != "q4":
-        return ()
-    try:
-        found = tuple([float(text[start:end]) for _, (start, end) in spans[:7]])
-    except ValueError:
-        return ()
-    return found if all(map(isfinite, found)) else ()
+    return Number(value, span) if isfinite(float(value)) else None
 
 
 def _doubt(values: tuple[float, ...]) -> str:
