@@ -64,10 +64,10 @@ def test_every_spelling_of_a_number_is_rendered_again(respot, tmp_path, number):
 
 def test_a_number_that_is_spelled_otherwise_is_a_failure(respot, tmp_path, monkeypatch):
     """The round trip is real: with a writer that drops a digit the answer is no."""
-    from respot.languages import writing
+    from respot.languages import overlay, writing
 
     writing.templates.cache_clear()
-    monkeypatch.setattr(writing, "spell", lambda value, style: f"{float(value):.1f}")
+    monkeypatch.setattr(overlay, "spell", lambda value, style: f"{float(value):.1f}")
     (tmp_path / "a.dat").write_text("DEFDAT a\nDECL REAL x=1.25\nENDDAT\n")
     try:
         result = respot("check", "a.dat", "--json")

@@ -202,6 +202,7 @@ def convert_to(
     """Convert and write, unless it is a dry run."""
     from respot.cli.show_convert import show_conversion
     from respot.correction.conversion import convert, record_of
+    from respot.languages.overlay import check_overlay
     from respot.output import check_in_place, check_output, rehearse, write_backup, write_in_place
 
     if output is not None and in_place:
@@ -209,6 +210,8 @@ def convert_to(
     if output is None and not in_place and not dry_run:
         message = "give the new folder with -o OUTDIR; or --in-place to change the backup itself, or --dry-run"
         raise BadInputError("BAD_OPTION", message)
+    if chosen.templates is not None:
+        check_overlay(chosen.templates)
     if in_place:
         check_in_place(source)
     if output is not None:
@@ -218,13 +221,13 @@ def convert_to(
     conversion = convert(source, reference, calibration, fit_options, chosen)
     files, correction = conversion.files, conversion.correction
     written = None if dry_run else output
+    if dry_run or chosen.templates is not None:  # a plant's template is proved before anything is written
+        rehearse(files, correction, chosen.templates)
     if written is not None:
         write_backup(written, files, correction, record_of(conversion), force)
     elif in_place and not dry_run and correction.files and conversion.source.backup is not None:
         written = source
         write_in_place(source, conversion.source.backup.files, files, correction, record_of(conversion))
-    else:
-        rehearse(files, correction)
     data = {
         **conversion.as_json(),
         "verified": True,

@@ -17,11 +17,39 @@ from respot.languages import Language
 from respot.program.robot import ProgramFile, Robot
 from respot.program.targets import Number
 from respot.source import SourceText, Span
-from respot.tolerance import FLANGE_DEG, FLANGE_MM, NumberStyle
+from respot.tolerance import (
+    ANGLE_DECIMALS,
+    FLANGE_DEG,
+    FLANGE_MM,
+    LENGTH_DECIMALS,
+    QUATERNION_DECIMALS,
+    NumberStyle,
+)
+
+#: Decimals that a field must have at least to say what is intended.
+_DECIMALS = {
+    **dict.fromkeys("XYZxyz", LENGTH_DECIMALS),
+    **dict.fromkeys("ABC", ANGLE_DECIMALS),
+    **dict.fromkeys(("q1", "q2", "q3", "q4"), QUATERNION_DECIMALS),
+}
 
 
 class VerifyError(Exception):
-    """What was written is not what was intended."""
+    """What was written is not what was intended.
+
+    Parameters
+    ----------
+    message : str
+        What, with the file.
+    path : str, optional
+        The file.
+    line : int, optional
+        Line of what was written.
+    """
+
+    def __init__(self, message: str, path: str | None = None, line: int | None = None) -> None:
+        super().__init__(message)
+        self.path, self.line = path, line
 
 
 def prove(correction: Correction, old: Mapping[str, bytes], new: Mapping[str, bytes]) -> None:
@@ -98,10 +126,11 @@ def _check_flanges(correction: Correction, robot: Robot) -> None:
     wrong = np.flatnonzero(unknown | (shift > FLANGE_MM) | (turn > FLANGE_DEG))
     if len(wrong):
         move = before[int(wrong[0])]
-        raise VerifyError(
+        message = (
             f"{move.path}:{move.line}: {move.target or move.instruction} puts the flange {shift[wrong[0]]:.4f} mm and "
             f"{turn[wrong[0]]:.5f} degrees from where it was intended"
         )
+        raise VerifyError(message, move.path, move.line)
 
 
 def _compare(
@@ -114,7 +143,7 @@ def _compare(
     edits: Mapping[Span, PointEdit],
 ) -> None:
     if len(before) != len(after):
-        raise VerifyError(f"{path}: has {len(after)} positions where it had {len(before)}")
+        raise VerifyError(f"{path}: has {len(after)} positions where it had {len(before)}", path)
     old_cuts, new_cuts = _header(old, language), _header(new, language)
     for (old_span, old_numbers), (new_span, new_numbers) in zip(before, after, strict=True):
         edit = edits.get(old_span)
@@ -126,7 +155,8 @@ def _compare(
         new_cuts += [new_numbers[name].span for name in names if name in old_numbers]
         _check_values(path, new.source, edit, new_numbers)
     if _cut(old.source.text, old_cuts) != _cut(new.source.text, new_cuts):
-        raise VerifyError(f"{path}: differs outside the numbers of moved targets")
+        line = _first_difference(old.source.text, old_cuts, new.source, new_cuts)
+        raise VerifyError(f"{path}: differs outside the numbers of moved targets, first in line {line}", path, line)
 
 
 def _check_values(path: str, source: SourceText, edit: PointEdit, numbers: Mapping[str, Number]) -> None:
@@ -134,11 +164,14 @@ def _check_values(path: str, source: SourceText, edit: PointEdit, numbers: Mappi
         number = numbers.get(name)
         if number is None:
             if abs(value) > 1e-3:
-                raise VerifyError(f"{path}: {edit.target} lacks {name}")
+                raise VerifyError(f"{path}: {edit.target} lacks {name}", path, edit.line)
             continue
-        style = NumberStyle.of(source.text[slice(*number.span)])
+        # half a digit of a number that was cut short would excuse what was cut
+        style = NumberStyle.of(source.text[slice(*number.span)]).at_least(_DECIMALS.get(name, 0))
         if abs(float(number.value) - value) > style.half_digit * (1.0 + 1e-6) + 1e-12:
-            raise VerifyError(f"{path}: {edit.target} has {name} {number.value}, {value:.9f} was intended")
+            line = source.place(number.span[0])[0]
+            message = f"{path}: {edit.target} has {name} {number.value}, {value:.9f} was intended"
+            raise VerifyError(message, path, line)
 
 
 def _header(file: ProgramFile, language: Language) -> list[Span]:
@@ -154,6 +187,17 @@ def _added(source: SourceText, literal: Span, numbers: Sequence[Number]) -> list
         comma = source.text.rfind(",", literal[0], number.span[0])
         spans.append((comma, number.span[1]))
     return spans
+
+
+def _first_difference(old: str, old_spans: Sequence[Span], new: SourceText, new_spans: Sequence[Span]) -> int:
+    """Line of a new text at which it departs from the old one outside of spans."""
+    first, second = _cut(old, old_spans), _cut(new.text, new_spans)
+    same = next((at for at, pair in enumerate(zip(first, second, strict=False)) if pair[0] != pair[1]), len(first))
+    for start, end in sorted(new_spans):
+        if same < start:
+            break
+        same += end - start
+    return new.place(min(same, len(new.text)))[0]
 
 
 def _cut(text: str, spans: Sequence[Span]) -> str:

@@ -13,10 +13,9 @@ from decimal import Decimal
 from functools import cache
 from pathlib import Path
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
+from respot.issues import BadInputError
+from respot.languages.overlay import COMMENT_MARKS, environment, render
 from respot.program.targets import Number
-from respot.resources import resource
 from respot.source import SourceText, Span
 from respot.tolerance import MOST_DECIMALS, NumberStyle, spell
 
@@ -87,23 +86,9 @@ class Templates:
     """
 
     def __init__(self, language: str, overlay: Path | None = None) -> None:
-        folders = [resource("templates", language)]
-        if overlay is not None:
-            folders.insert(0, overlay / language)
-        # robot code is no HTML: escaping would change it
-        self._environment = Environment(
-            loader=FileSystemLoader(folders),
-            block_start_string="<%",
-            block_end_string="%>",
-            variable_start_string="<<",
-            variable_end_string=">>",
-            comment_start_string="<#",
-            comment_end_string="#>",
-            undefined=StrictUndefined,
-            autoescape=False,  # noqa: S701
-            keep_trailing_newline=False,
-        )
-        self._environment.filters["spell"] = spell
+        self._overlay = overlay
+        self._environment = environment(language, overlay)
+        self._mark = COMMENT_MARKS[language]
 
     def literal(self, text: str, span: Span, changes: Iterable[Change]) -> str:
         """Text of a literal with some of its numbers changed.
@@ -116,6 +101,11 @@ class Templates:
             Span of the literal.
         changes : iterable of Change
             Numbers within the span, in any order.
+
+        Raises
+        ------
+        BadInputError
+            ``BAD_TEMPLATE``, as for all texts of a plant's template that fails.
         """
         return self._numbers("literal.j2", text, span, changes)
 
@@ -129,17 +119,54 @@ class Templates:
         for change in sorted(changes, key=lambda change: change.number.span):
             fields.append(Field(text[position : change.number.span[0]], change.value, change.style))
             position = change.number.span[1]
-        return self._environment.get_template(template).render(fields=fields, tail=text[position:end])
+        return self._render(template, text[slice(*span)], fields=fields, tail=text[position:end])
 
     def complete(self, literal: str, missing: Mapping[str, float], style: NumberStyle) -> str:
         """Text of a literal with components that it left out."""
-        template = self._environment.get_template("complete.j2")
-        return template.render(literal=literal, missing=missing, style=style)
+        return self._render("complete.j2", literal, literal=literal, missing=missing, style=style)
 
     def header(self, header: Header, newline: str) -> str:
-        """Text of the header, every line ended."""
-        text = self._environment.get_template("header.j2").render(header=header)
+        """Text of the header, every line ended.
+
+        Raises
+        ------
+        BadInputError
+            ``BAD_TEMPLATE`` if it would not be found again, or does not say what was applied to what.
+        """
+        text = self._render("header.j2", "", header=header)
+        self._check_header(text, header)
         return "".join(line + newline for line in text.splitlines())
+
+    def _render(self, name: str, source: str, **data: object) -> str:
+        """Render a template; every character beyond ASCII must come from the ``source``, whose code page has it."""
+        text = render(self._environment, name, self._overlay, data)
+        strange = set() if text.isascii() else {character for character in text if ord(character) > 127} - set(source)
+        if strange:
+            message = f"writes {''.join(sorted(strange))!r}: not every controller has such letters; write plain ASCII"
+            raise self._bad(name, message)
+        return text
+
+    def _check_header(self, text: str, header: Header) -> None:
+        start = f"{self._mark}respot: "
+        for line in text.splitlines():
+            if not line.strip(" \t").startswith(start) or _HEADER_LINE.fullmatch(f"{line}\n") is None:
+                message = f"writes the line {line!r}: each must begin with {start!r}, or the header is not found again"
+                raise self._bad("header.j2", message)
+        said = f"{start}{header.version} {header.direction} {header.kind}"
+        if not any(line.strip(" \t").startswith(said) for line in text.splitlines()):
+            raise self._bad("header.j2", f"has no line {said!r}, which says what was done and for which cell")
+        if set(_APPLIED.findall(text)) != {header.calibration_sha256, *header.earlier}:
+            message = (
+                f"lacks '{start}calibration sha256 ...' or '{start}earlier calibration sha256 ...': without them a "
+                "calibration could be applied twice"
+            )
+            raise self._bad("header.j2", message)
+        if f"{start}source sha256 {header.source_sha256}" not in text:
+            raise self._bad("header.j2", f"lacks '{start}source sha256 ...', the file that it was made from")
+
+    def _bad(self, name: str, message: str) -> BadInputError:
+        path = self._environment.get_template(name).filename
+        return BadInputError("BAD_TEMPLATE", f"{message}. Nothing was written", path)
 
 
 @cache

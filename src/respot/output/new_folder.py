@@ -9,20 +9,41 @@ from pathlib import Path
 from respot.correction.conversion import RECORD
 from respot.correction.correction import Correction
 from respot.correction.proof import VerifyError, prove
+from respot.issues import BadInputError
+from respot.languages.overlay import overridden
 from respot.output.disk import flush, read, write
 from respot.output.folders import check_output
 from respot.output.workplace import workplace
 
 
-def rehearse(files: Mapping[str, bytes], correction: Correction) -> None:
+def rehearse(files: Mapping[str, bytes], correction: Correction, templates: Path | None = None) -> None:
     """Prove a correction without writing it.
+
+    Parameters
+    ----------
+    files : mapping of str to bytes
+        The backup as it was.
+    correction : Correction
+        Its changed files.
+    templates : Path, optional
+        A plant's own templates that wrote the changes.
 
     Raises
     ------
+    BadInputError
+        ``BAD_TEMPLATE``: what a plant's templates wrote is not what is intended.
     VerifyError
-        What would be written is not what is intended.
+        The same without templates of a plant: a fault of ours.
     """
-    prove(correction, files, {**files, **correction.files})
+    try:
+        prove(correction, files, {**files, **correction.files})
+    except VerifyError as error:
+        own = overridden(templates, correction.language.name) if templates is not None else []
+        if not own:
+            raise
+        names = ", ".join(str(path) for path in own)
+        message = f"written with {names} it would not be what is intended: {error}. Nothing was written"
+        raise BadInputError("BAD_TEMPLATE", message, error.path, error.line) from error
 
 
 def write_backup(
