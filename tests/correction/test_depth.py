@@ -9,6 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from respot.calibration.calibration import Calibration
@@ -143,6 +145,54 @@ def test_rapid_a_held_part_is_a_work_object(tmp_path):
             for w, done in zip(there, (points, frames), strict=True)
         ]
         assert poses[1] == pytest.approx(poses[0], abs=1e-3)
+
+
+def random_frames(files: dict[str, str], dice: np.random.Generator) -> dict[str, str]:
+    """The same programs under other bases and tools, of both languages."""
+
+    def krl_members() -> str:
+        values = [
+            *dice.uniform(-1500, 1500, 3),
+            dice.uniform(-180, 180),
+            dice.uniform(-80, 80),
+            dice.uniform(-180, 180),
+        ]
+        return ",".join(f"{name} {value:.3f}" for name, value in zip("XYZABC", values, strict=True))
+
+    def rapid_pose() -> str:
+        quaternion = dice.normal(size=4)
+        quaternion /= np.linalg.norm(quaternion)
+        place = ",".join(f"{value:.2f}" for value in dice.uniform(-1500, 1500, 3))
+        return f"[[{place}],[{','.join(f'{value:.9f}' for value in quaternion)}]]"
+
+    made = {}
+    for path, text in files.items():
+        text = re.sub(
+            r"^((?:BASE|TOOL)_DATA\[1\]=)\{.*?\}", lambda match: f"{match[1]}{{{krl_members()}}}", text, flags=re.M
+        )
+        text = re.sub(r"(tGun:=\[TRUE,)\[\[.*?\]\]", lambda match: match[1] + rapid_pose(), text)
+        text = re.sub(
+            r'(wDoor:=\[FALSE,TRUE,"",).*(\];)',
+            lambda match: f"{match[1]}{rapid_pose()},{rapid_pose()}{match[2]}",
+            text,
+        )
+        made[path] = text
+    return made
+
+
+@settings(max_examples=10, deadline=None)
+@given(seed=st.integers(0, 2**32), language=st.sampled_from(["krl", "rapid"]))
+def test_the_law_of_depth(seed, language, tmp_path_factory):
+    """Whatever bases and tools are, frames and points take the flange to the same places."""
+    dice = np.random.default_rng(seed)
+    files = random_frames(krl() if language == "krl" else rapid(), dice)
+    points, frames = both(tmp_path_factory.mktemp("law"), files, "--keep-config", "--max-shift", "5000,180")
+    assert set(depths(frames).values()) == {"base"}
+    flange = krl_flange if language == "krl" else rapid_flange
+    for name in SPOTS:
+        one, other = flange(points.folder, name), flange(frames.folder, name)
+        assert other[:3, 3] == pytest.approx(one[:3, 3], abs=6e-3)  # digits of the points, over a tool of 2 m
+        assert other[:3, :3] == pytest.approx(one[:3, :3], abs=3e-6)
 
 
 # ----------------------------------------------------------------------------------------------- frames that are left alone
