@@ -18,6 +18,7 @@ from tests.convert.independent import abc_of, angle_between, quaternion_of
 from tests.convert.reading import CONFIGURATION, ORIENTATION, POSITION, Literal, Reading, Use
 
 HEADER = re.compile(r"[ \t]*[;!]respot: [^\r\n]*(?:\r*\n|\r|$)")
+SUFFIXES = (".src", ".dat", ".sub", ".mod", ".sys", ".prg", ".modx", ".sysx")
 READERS = {"krl": read_krl.read, "rapid": read_rapid.read}
 #: Beyond this cosine of B digits of A and C count for the pose only, not each for itself.
 LOCK_COSINE = 5e-3
@@ -50,8 +51,14 @@ def language_of(paths: Iterable[str]) -> str:
     return "krl" if suffixes & {".src", ".dat"} else "rapid"
 
 
+def live(files: Mapping[str, bytes]) -> dict[str, bytes]:
+    """Files that a controller runs: of an ABB backup those of its tasks, if it has such, without copies under HOME."""
+    tasks = {path: data for path, data in files.items() if re.search(r"(^|/)RAPID/TASK\d+/", path, re.IGNORECASE)}
+    return tasks or dict(files)
+
+
 def read(files: Mapping[str, bytes]) -> Reading:
-    return READERS[language_of(files)](decoded(files))
+    return READERS[language_of(files)](decoded(live(files)))
 
 
 def in_base(base: np.ndarray, transform: np.ndarray) -> np.ndarray:
@@ -225,7 +232,7 @@ def _judge_left_behind(
                 elif use.base is not None:
                     stayed.append((literal, use))
     told = {(item["program"].lower()) for item in record["refused"]}
-    listed = {item["target"].lower() for item in record["unmoved"]}
+    listed = {item["target"].lower() for item in (*record["unmoved"], *record["refused"])}
     for literal, use in stayed:
         program = Path(use.program).stem.lower()
         expected = (use.program, use.base.round(6).tobytes()) in moved and literal.complete and program not in told
@@ -236,8 +243,13 @@ def _judge_left_behind(
 # ---------------------------------------------------------------------------------------------------------------- back
 
 
-def judge_back(old: Mapping[str, bytes], back: Mapping[str, bytes], edits: list[dict]) -> Findings:
-    """Judge what a conversion and its inverse left of the original: header and last digits apart, nothing changed."""
+def judge_back(
+    old: Mapping[str, bytes], back: Mapping[str, bytes], edits: list[dict], configurations: bool = True
+) -> Findings:
+    """Judge what a conversion and its inverse left of the original: header and last digits apart, nothing changed.
+
+    Without ``configurations`` status, turn and confdata may differ: where they were kept unchecked on one of both ways.
+    """
     found = Findings()
     edited = {edit["path"] for edit in edits}
     if set(old) != set(back):
@@ -249,7 +261,7 @@ def judge_back(old: Mapping[str, bytes], back: Mapping[str, bytes], edits: list[
         pairs = list(_pairs(path, before, after, found))
         _judge_rest(path, before, after, pairs, found)
         for was, now in pairs:
-            problem = _not_restored(was, now)
+            problem = _not_restored(was, now, configurations)
             if problem:
                 found.wrong.append(f"{path}:{was.line} {was.name}: {problem}")
             else:
@@ -257,7 +269,7 @@ def judge_back(old: Mapping[str, bytes], back: Mapping[str, bytes], edits: list[
     return found
 
 
-def _not_restored(was: Literal, now: Literal) -> str:
+def _not_restored(was: Literal, now: Literal, configurations: bool) -> str:
     orientation = ORIENTATION[was.language]
     by_lock = was.language == "krl" and was.complete and abs(np.cos(np.radians(was.values("B")[0]))) < LOCK_COSINE
     steep = 1.0 / abs(np.cos(np.radians(was.values("B")[0]))) if was.language == "krl" and "B" in was.texts else 1.0
@@ -265,7 +277,7 @@ def _not_restored(was: Literal, now: Literal) -> str:
         digit = 2.0 * max(half_digit(text), 0.5e-11)
         if name in orientation and decimals(text) > 4:  # what is lost in the pose is more in A and C
             digit *= steep
-        if by_lock and name in "AC":
+        if (by_lock and name in "AC") or (name in CONFIGURATION[was.language] and not configurations):
             continue
         away = abs(float("".join(now.texts[name].split()).strip("'B")) - float("".join(text.split()).strip("'B")))
         if name in orientation and was.language == "krl":

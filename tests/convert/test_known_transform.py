@@ -12,23 +12,8 @@ from typer.testing import CliRunner
 from respot.calibration.calibration import Calibration
 from respot.cli import app
 from tests.convert import laws
-from tests.convert.independent import SAMPLES, matrix
-
-#: 30 mm, and 2 degrees about a skew axis through the middle of the spots.
-AXIS = np.array([1.0, -2.0, 2.0]) / 3.0
-SHIFT = np.array([18.0, -18.0, 16.0]) * 30.0 / np.linalg.norm([18.0, -18.0, 16.0])
-
-
-def rotation_about_axis(axis: np.ndarray, degrees: float) -> np.ndarray:
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    turn = np.radians(degrees)
-    return np.eye(3) + np.sin(turn) * cross + (1.0 - np.cos(turn)) * cross @ cross
-
-
-def transform_about(centre: np.ndarray) -> np.ndarray:
-    turn = rotation_about_axis(AXIS, 2.0)
-    return matrix(turn, centre + SHIFT - turn @ centre)
+from tests.convert.independent import SAMPLES
+from tests.convert.known_transform import transform_about
 
 
 def save_calibration(path: Path, transform: np.ndarray, ids: tuple[str, ...]) -> None:

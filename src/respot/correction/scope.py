@@ -26,6 +26,8 @@ from respot.tolerance import SAME_POSITION_MM, SAME_ROTATION_DEG
 
 #: A literal position within a statement that no rule knows: ``[[1,2,3],..``, ``{X 1,..``, ``{E6POS: X 1,..``.
 _POSE = re.compile(r"\[\s*\[|\{\s*(?:\w+\s*:)?\s*[XYZ]\s", re.IGNORECASE)
+#: Doubts that tell why it is not known what carries the part.
+_OF_FRAMES = ("UNKNOWN_FRAME", "UNKNOWN_MODE", "UNKNOWN_TOOL")
 _NAME = re.compile(r"[^\W\d][\w$]*(?:\[[\d,]+\])?(?:\.\w+)*")
 
 
@@ -216,7 +218,8 @@ class _Finder:
             return refuse(_code_of(move), move.unknown) if move.unknown else None
         if move.workpiece is None:
             what = "what the robot holds" if move.external_tcp else "the base of this motion"
-            return refuse("UNKNOWN_FRAME", move.unknown or f"the program does not tell {what}")
+            told = [doubt.text for doubt in move.doubts if doubt.code in _OF_FRAMES]
+            return refuse("UNKNOWN_FRAME", told[0] if told else f"the program does not tell {what}")
         if move.base2spots is None:
             assert move.base is not None  # noqa: S101 - the base is what carries the part
             return refuse("UNKNOWN_FRAME", f"base {move.base}: {move.base.unknown}")
