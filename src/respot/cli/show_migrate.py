@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from respot.cli.display import Column, heading, line, table
-from respot.figures.line_page import common_text, goes_with_text, headline, sizes_text
+from respot.figures.line_page import common_text, goes_with_text, headline, size_text
 from respot.figures.words import effect_noun, figure, listing
 
 if TYPE_CHECKING:
@@ -80,8 +80,9 @@ def _show_fleet(data: Mapping[str, Any]) -> None:
         return
     heading("effects that return")
     for row in returning:
-        sizes = "; ".join(sizes_text(name, held) for name, held in row["sizes"].items())
-        line(f"  {row['label']}: {row['count']} of {row['of']} robots, proved on {row['named']}. {sizes}")
+        size = size_text(row["size"])
+        large = f"; {size}" if size else ""
+        line(f"  {row['label']}: {row['count']} of {row['of']} robots, proved on {row['named']}{large}")
         for item in row["goes_with"]:
             line(f"    gathers on {goes_with_text(item)}")
 
@@ -89,5 +90,5 @@ def _show_fleet(data: Mapping[str, Any]) -> None:
 def _show_groups(data: Mapping[str, Any]) -> None:
     for group in data["groups"]:
         for effect in group["effects"]:
-            common = "; ".join(common_text(name, held) for name, held in effect["parameters"].items())
-            line(f"  group {group['group']}, {effect['label']} ({listing(effect['robots'])}): {common}")
+            shown = f"{effect['label']} ({listing(effect['robots'])})"
+            line(f"  group {group['group']}, {shown}: {common_text(effect)}")

@@ -8,13 +8,14 @@ from urllib.parse import quote
 
 from respot import __version__
 from respot.figures.pages import render
-from respot.figures.words import count, effect_noun, figure, listing, size, with_unit
+from respot.figures.words import count, decimals_of, effect_noun, figure, listing, size, with_unit
 
 Row = Mapping[str, Any]
 _TRAITS = {"language": "maker", "model": "robot type"}
 _MAKERS = {"krl": "KUKA", "rapid": "ABB"}
 #: Robots that are named beside an effect; the table below has them all.
 _MOST_NAMED = 8
+_MOST_VALUES = 6
 
 
 def line_page(record: Mapping[str, Any]) -> str:
@@ -72,16 +73,18 @@ def _effect(row: Row) -> dict[str, Any]:
         "count": row["count"],
         "of": row["of"],
         "named": row["named"],
-        "sizes": [sizes_text(name, held) for name, held in row["sizes"].items()],
+        "size": size_text(row["size"]),
         "goes_with": [goes_with_text(item) for item in row["goes_with"]],
-        "robots": listing(names[:_MOST_NAMED], _MOST_NAMED, ",") + (f" and {more} more" if more > 0 else ""),
+        "robots": ", ".join(names[:_MOST_NAMED]) + (f" and {more} more" if more > 0 else ""),
     }
 
 
-def sizes_text(name: str, held: Row) -> str:
-    """Say how large a parameter is over the robots that show it."""
+def size_text(held: Row | None) -> str:
+    """Say how large an effect is over the robots that show it; empty where one number does not tell."""
+    if held is None:
+        return ""
     low, middle, high = (figure(held[key]) for key in ("least", "median", "most"))
-    return with_unit(f"{name} {middle} ({low} to {high})", held["unit"])
+    return with_unit(f"{middle} ({low} to {high})", held["unit"])
 
 
 def goes_with_text(item: Row) -> str:
@@ -94,11 +97,18 @@ def goes_with_text(item: Row) -> str:
     )
 
 
-def common_text(name: str, held: Row) -> str:
-    """Say what value robots of a group have in common, or that they do not."""
-    half = figure((held["ci95"][1] - held["ci95"][0]) / 2.0)
-    text = with_unit(f"{name} {figure(held['value'])} +- {half}", held["unit"])
-    return text if held["agree"] else f"{text}, but they do NOT agree (p = {held['agree_p']:.1g})"
+def common_text(effect: Row) -> str:
+    """Say what values robots of a group have in common, or that they do not."""
+    if not effect["agree"]:
+        return f"they do NOT agree (p = {effect['agree_p']:.1g}): each has its own"
+    if len(effect["parameters"]) > _MOST_VALUES:
+        return f"they agree (p = {effect['agree_p']:.2g}); {len(effect['parameters'])} values, in the JSON"
+    texts = []
+    for name, held in effect["parameters"].items():
+        half = (held["ci95"][1] - held["ci95"][0]) / 2.0
+        value = f"{figure(held['value'], decimals_of(half))} +- {figure(half, decimals_of(half))}"
+        texts.append(with_unit(f"{name} {value}", held["unit"]))
+    return "; ".join(texts)
 
 
 def _group(group: Row) -> dict[str, Any]:
@@ -109,7 +119,7 @@ def _group(group: Row) -> dict[str, Any]:
             {
                 "label": effect["label"],
                 "robots": listing(effect["robots"]),
-                "parameters": [common_text(name, held) for name, held in effect["parameters"].items()],
+                "common": common_text(effect),
             }
             for effect in group["effects"]
         ],

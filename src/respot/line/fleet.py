@@ -1,16 +1,17 @@
 """Looks over all robots of a line: which effects return, on which robots, and whether robots of a group agree.
 
-Nothing here changes a robot's own result. Robots of one group are fitted one by one; what they have in common is told
-from their results, with the test whether these agree.
+Nothing here changes a robot's own result: robots of one group are fitted one by one, and what they have in common is
+told from their results, with the test whether these agree.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import comb, isfinite, sqrt
+from math import comb, hypot
 from statistics import median
 from typing import Any
 
+import numpy as np
 from scipy.special import chdtrc
 
 from respot.figures.words import effect_noun
@@ -36,9 +37,9 @@ def fleet_of(robots: Sequence[Row]) -> list[dict[str, Any]]:
     Returns
     -------
     list of dict
-        ``effect``, ``label``, ``robots`` that show it, ``of`` how many that were fitted, ``named`` on how many,
-        ``sizes`` of each parameter (median, least, greatest), and ``goes_with``: traits whose robots show it more often
-        than the others would by luck (one-sided, hypergeometric, times the number of values that were looked at).
+        ``effect``, ``label``, ``robots`` that show it, ``of`` how many that were fitted, ``named`` on how many, its
+        ``size`` (median, least, most; None where one number does not tell it), and ``goes_with``: traits whose robots
+        show it more often than they would by luck (one-sided, hypergeometric, times the number of values looked at).
     """
     fitted = [robot for robot in robots if robot["spots"] is not None]
     found: dict[str, list[tuple[Row, Row]]] = {}
@@ -55,9 +56,9 @@ def groups_of(robots: Sequence[Row]) -> list[dict[str, Any]]:
     Returns
     -------
     list of dict
-        ``group``, ``robots`` fitted, and for each effect that two or more of them show ``parameters``: the common value
-        with its 95 % interval (each robot's weighs by its own), and ``agree_p``, the chance that they differ as much
-        though they are one. Vectors are in each robot's own world frame.
+        ``group``, ``robots`` fitted, and ``effects`` that two or more of them show: ``parameters``, the common values
+        with their 95 % intervals, and ``agree_p``, the chance that the robots differ as much though the values are one.
+        Robots that do not show an effect have no part in its values. Vectors are in each robot's own world frame.
     """
     members: dict[str, list[Row]] = {}
     for robot in robots:
@@ -69,8 +70,7 @@ def groups_of(robots: Sequence[Row]) -> list[dict[str, Any]]:
         for robot in fitted:
             for effect in robot["effects"]:
                 found.setdefault(_key(effect), []).append((robot, effect))
-        common = [_common(pairs) for pairs in found.values() if len({robot["name"] for robot, _ in pairs}) > 1]
-        told = [effect for effect in common if effect["parameters"]]
+        told = [common for pairs in found.values() if (common := _common(pairs)) is not None]
         groups.append({"group": group, "robots": [robot["name"] for robot in fitted], "effects": told})
     return groups
 
@@ -98,19 +98,9 @@ def _effect(pairs: Sequence[tuple[Row, Row]], fitted: Sequence[Row]) -> dict[str
         "count": len(names),
         "of": len(fitted),
         "named": sum(bool(effect["named"]) for _, effect in pairs),
-        "sizes": _sizes([effect for _, effect in pairs]),
+        "size": _size([effect for _, effect in pairs]),
         "goes_with": _goes_with(names, fitted),
     }
-
-
-def _sizes(effects: Sequence[Row]) -> dict[str, dict[str, Any]]:
-    sizes = {}
-    for name in dict.fromkeys(name for effect in effects for name in effect["parameters"]):
-        held = [effect["parameters"][name] for effect in effects if name in effect["parameters"]]
-        values = [item["value"] for item in held if item["value"] is not None]
-        if values:
-            sizes[name] = {"unit": held[0]["unit"], "median": median(values), "least": min(values), "most": max(values)}
-    return sizes
 
 
 def _goes_with(names: set[str], fitted: Sequence[Row]) -> list[dict[str, Any]]:
@@ -147,39 +137,60 @@ def _tail(showing: int, drawn: int, marked: int, total: int) -> float:
     return ways / comb(total, drawn)
 
 
-def _common(pairs: Sequence[tuple[Row, Row]]) -> dict[str, Any]:
+def _common(pairs: Sequence[tuple[Row, Row]]) -> dict[str, Any] | None:
+    """Estimate of an effect from several robots together; None where they do not say how sure they are.
+
+    Weighing each robot's values by the inverse of their covariance gives what one least-squares fit of all robots
+    gives, with the effect in common and everything else of each robot its own. Values that each robot's own data scale
+    (the most welds of its caps, the middle of its spots) are no common ones.
+    """
     first = pairs[0][1]
-    parameters = {}
-    for name, held in first["parameters"].items():
-        values = [_value_and_sd(effect["parameters"].get(name)) for _, effect in pairs]
-        known = [value for value in values if value is not None]
-        if len(known) < 2:
-            continue
-        weights = [1.0 / sd**2 for _, sd in known]
-        mean = sum(weight * value for weight, (value, _) in zip(weights, known, strict=True)) / sum(weights)
-        spread = sum(weight * (value - mean) ** 2 for weight, (value, _) in zip(weights, known, strict=True))
-        half = _HALF / sqrt(sum(weights))
-        agree = float(chdtrc(len(known) - 1, spread))
-        parameters[name] = {
-            "unit": held["unit"],
-            "value": mean,
-            "ci95": [mean - half, mean + half],
-            "agree_p": agree,
-            "agree": agree >= _RARE,
-        }
+    names = list(first["parameters"])
+    known = [
+        (robot, np.array([effect["parameters"][name]["value"] for name in names]), np.array(effect["covariance"]))
+        for robot, effect in pairs
+        if list(effect["parameters"]) == names and effect["covariance"] and effect["form"] == first["form"]
+    ]
+    if len({robot["name"] for robot, _, _ in known}) < 2:
+        return None
+    weights = [np.linalg.pinv(covariance, hermitian=True) for _, _, covariance in known]
+    together = np.linalg.pinv(np.sum(weights, axis=0), hermitian=True)
+    mean = together @ np.sum([weight @ value for weight, (_, value, _) in zip(weights, known, strict=True)], axis=0)
+    off = [(value - mean, weight) for weight, (_, value, _) in zip(weights, known, strict=True)]
+    apart = sum(float(shift @ weight @ shift) for shift, weight in off)
+    agree = float(chdtrc((len(known) - 1) * len(names), apart))
+    half = _HALF * np.sqrt(np.maximum(np.diag(together), 0.0))
     return {
         "effect": {"name": first["name"], "where": _place(first)},
         "label": label_of(first),
-        "robots": [robot["name"] for robot, _ in pairs],
-        "parameters": parameters,
+        "robots": [robot["name"] for robot, _, _ in known],
+        "parameters": {
+            name: {
+                "unit": first["parameters"][name]["unit"],
+                "value": float(mean[row]),
+                "ci95": [float(mean[row] - half[row]), float(mean[row] + half[row])],
+            }
+            for row, name in enumerate(names)
+        },
+        "agree_p": agree,
+        "agree": agree >= _RARE,
     }
 
 
-def _value_and_sd(parameter: Row | None) -> tuple[float, float] | None:
-    """Value and standard deviation of a parameter with an interval."""
-    if parameter is None or parameter["value"] is None or not parameter.get("ci95"):
+def _magnitude(effect: Row) -> tuple[float, str] | None:
+    """How large an effect is as one number: its one parameter, or the length of its shift in mm."""
+    known = {name: held for name, held in effect["parameters"].items() if held["value"] is not None}
+    if len(known) == 1:
+        (held,) = known.values()
+        return abs(held["value"]), held["unit"]
+    if not set("xyz") <= set(known) or any(known[axis]["unit"] != "mm" for axis in "xyz"):
         return None
-    low, high = parameter["ci95"]
-    if low is None or high is None or not isfinite(high - low) or high <= low:
+    return hypot(*(known[axis]["value"] for axis in "xyz")), "mm"
+
+
+def _size(effects: Sequence[Row]) -> dict[str, Any] | None:
+    found = [magnitude for effect in effects if (magnitude := _magnitude(effect)) is not None]
+    if not found or len({unit for _, unit in found}) > 1:
         return None
-    return float(parameter["value"]), (high - low) / (2.0 * _HALF)
+    values = [value for value, _ in found]
+    return {"unit": found[0][1], "median": median(values), "least": min(values), "most": max(values)}

@@ -52,14 +52,17 @@ def line_record(name: str, rows: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
         As `Ledger.rows` gives them.
     """
     robots = [robot_record(row) for row in rows]
+    fleet, groups = fleet_of(robots), groups_of(robots)
+    for robot in robots:  # as long as all the rest, and in the ledger and the calibrations
+        robot["effects"] = [{key: effect[key] for key in effect if key not in _LONG} for effect in robot["effects"]]
     return {
         "schema": "respot.migrate/1",
         "version": __version__,
         "line": name,
         "robots": robots,
         "totals": totals(robots),
-        "fleet": fleet_of(robots),
-        "groups": groups_of(robots),
+        "fleet": fleet,
+        "groups": groups,
     }
 
 
@@ -127,6 +130,7 @@ def totals(robots: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     }
 
 
+_LONG = ("covariance", "form")
 _STATES = ("done", "failed", "waiting", "running")
 
 

@@ -7,11 +7,12 @@ import hashlib
 import tempfile
 import time
 import traceback
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import chdir, contextmanager
 from pathlib import Path
 from typing import Any
 
+from respot.calibration.calibration import Calibration
 from respot.calibration.final_model import precise
 from respot.calibration.report import report
 from respot.calibration.source_fit import FitOptions, SourceFit, fit_source
@@ -19,10 +20,10 @@ from respot.correction.conversion import Conversion, convert, record_of
 from respot.correction.proof import VerifyError
 from respot.figures.fit_page import fit_page
 from respot.issues import BadInputError, Issue
+from respot.line.findings import effects_of, fit_figures, identity
 from respot.line.jobs import Job, JobResult, inputs_changed
 from respot.line.settings import correction_options, fit_options, tolerance_of
 from respot.output import rehearse, write_backup
-from respot.program.robot import Robot
 
 #: What a robot's folder holds: the backup corrected, the page of its fit, its calibration.
 PROGRAMS, PAGE, CALIBRATION = "programs", "fit.html", "calibration.json"
@@ -106,7 +107,7 @@ def _work(job: Job, out: Path | None) -> JobResult:
         fitted = _nothing_to_write(error, job, reference, fitting)
         if fitted is None:
             raise
-        return _fitted(job, fitted, out)
+        return _fitted(job, fitted, fitting, out)
     return _converted(job, conversion, out)
 
 
@@ -124,29 +125,35 @@ def _nothing_to_write(error: BadInputError, job: Job, reference: Path | None, fi
     return None if model.terms or model.tool_offset is not None else fitted
 
 
-def _fitted(job: Job, fitted: SourceFit, out: Path | None) -> JobResult:
+#: Why no program of a measured robot is written. The rigid part is the tracker's own place and nobody's error.
+_LOOKED = "no effect was found that programs could make good: they stay as they are"
+_NOT_ALL_LOOKED = "none of the effects that were looked for was found: the programs stay as they are"
+
+
+def _fitted(job: Job, fitted: SourceFit, fitting: FitOptions, out: Path | None) -> JobResult:
     record = report(fitted.fit)
     record["calibration_hash"] = fitted.fit.calibration.content_hash
     figures = {
-        **_identity(fitted.source.robot),
-        **_fit_figures(record),
+        **identity(fitted.source.robot),
+        **fit_figures(record),
         "programs": False,
         "edits": 0,
         "refused": [],
-        "note": "nothing to compensate: the robot goes where its programs say",
+        "note": _LOOKED if fitting.effects == "auto" else _NOT_ALL_LOOKED,
     }
+    model = precise(fitted.fit)
     if out is not None:
         out.mkdir(parents=True)
-        _write_fit(job, fitted, record, out)
-    return JobResult(job.name, "done", figures=figures, effects=_effects(record, {}), outputs=_manifest(out))
+        _write_fit(job, fitted, model, record, out)
+    return JobResult(job.name, "done", figures=figures, effects=effects_of(record, model), outputs=_manifest(out))
 
 
 def _converted(job: Job, conversion: Conversion, out: Path | None) -> JobResult:
     record = record_of(conversion)
     fit = record.get("fit")
     figures = {
-        **_identity(conversion.robot),
-        **({} if fit is None else _fit_figures(fit)),
+        **identity(conversion.robot),
+        **({} if fit is None else fit_figures(fit)),
         "programs": True,
         "direction": record["direction"],
         "edits": len(record["edits"]),
@@ -154,18 +161,19 @@ def _converted(job: Job, conversion: Conversion, out: Path | None) -> JobResult:
     }
     if record.get("effects_not_written"):
         figures["note"] = f"not written, for a person to put right: {', '.join(record['effects_not_written'])}"
+    model = None if conversion.fitted is None else precise(conversion.fitted.fit)
     if out is None:
         rehearse(conversion.files, conversion.correction)
     else:
         write_backup(out / PROGRAMS, conversion.files, conversion.correction, record)
-        if conversion.fitted is not None and fit is not None:
+        if conversion.fitted is not None and model is not None and fit is not None:
             fit["calibration_hash"] = conversion.calibration.content_hash
-            _write_fit(job, conversion.fitted, fit, out)
+            _write_fit(job, conversion.fitted, model, fit, out)
     return JobResult(
         job.name,
         "done",
         figures=figures,
-        effects=_effects(fit or {}, record),
+        effects=effects_of(fit or {}, model, record.get("effects_written", ())),
         edits=[{key: item[key] for key in _EDIT} for item in record["edits"]],
         outputs=_manifest(out),
     )
@@ -175,7 +183,7 @@ def _converted(job: Job, conversion: Conversion, out: Path | None) -> JobResult:
 _EDIT = ("path", "line", "target", "depth", "shift_mm", "turn_deg")
 
 
-def _write_fit(job: Job, fitted: SourceFit, record: Mapping[str, Any], out: Path) -> None:
+def _write_fit(job: Job, fitted: SourceFit, model: Calibration, record: Mapping[str, Any], out: Path) -> None:
     """Write the page, and the calibration where its orientations are read as they are written."""
     page = fit_page(
         record,
@@ -187,7 +195,7 @@ def _write_fit(job: Job, fitted: SourceFit, record: Mapping[str, Any], out: Path
     )
     _write(out / PAGE, page)
     if not fitted.fit.rereads_source:
-        _write(out / CALIBRATION, precise(fitted.fit).to_json())
+        _write(out / CALIBRATION, model.to_json())
 
 
 def _write(path: Path, text: str) -> None:
@@ -195,45 +203,6 @@ def _write(path: Path, text: str) -> None:
         path.write_text(text, encoding="utf-8", newline="\n")
     except OSError as error:
         raise BadInputError("CANNOT_WRITE", f"cannot be written: {error.strerror}", path.name) from error
-
-
-def _identity(robot: Robot | None) -> dict[str, Any]:
-    if robot is None:
-        return {}
-    version = robot.machine.facts.get("version")
-    return {
-        "robot": robot.name,
-        "language": robot.language,
-        "model": robot.machine.model,
-        "version": "" if version is None else version.value,
-    }
-
-
-def _fit_figures(record: Mapping[str, Any]) -> dict[str, Any]:
-    heldout = (record.get("heldout") or {}).get("after") or {}
-    return {
-        "kind": record["kind"],
-        "spots": record["n_matched"],
-        "inliers": record["n_inliers"],
-        "before": record["before"]["rms"],
-        "after": record["after"]["rms"],
-        "heldout": heldout.get("rms"),
-        "unexplained": bool((record.get("unexplained") or {}).get("present")),
-    }
-
-
-def _effects(fit: Mapping[str, Any], record: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """What the line keeps of each effect."""
-    written: Sequence[str] = record.get("effects_written", ())
-    return [
-        {
-            **{
-                key: effect.get(key) for key in ("name", "where", "parameters", "named", "not_separated_from", "remedy")
-            },
-            "written": any(label.split()[0] == effect["name"] for label in written),
-        }
-        for effect in fit.get("effects", ())
-    ]
 
 
 def _manifest(out: Path | None) -> dict[str, tuple[str, int]]:
