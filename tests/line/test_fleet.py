@@ -43,14 +43,14 @@ def test_effects_are_counted_by_kind_and_place():
 
 
 def test_robots_that_an_effect_gathers_on_are_told_with_their_chance():
-    robots = [robot(f"W{n}", *([effect()] if n < 7 else []), gun="G2", station=f"{n}") for n in range(8)]
+    robots = [robot(f"W{n}", *([effect()] if n < 8 else []), gun="G2", station=f"{n}") for n in range(8)]
     robots += [robot(f"N{n}", *([effect()] if n < 1 else []), gun="G1", station=f"{n}") for n in range(12)]
     (row,) = fleet_of(robots)
     (found,) = row["goes_with"]
-    assert (found["trait"], found["value"], found["showing"], found["of"]) == ("gun", "G2", 7, 8)
+    assert (found["trait"], found["value"], found["showing"], found["of"]) == ("gun", "G2", 8, 8)
     assert found["elsewhere"] == {"showing": 1, "of": 12}
     looked_at = 2 + 12  # guns and stations
-    expected = fisher_exact([[7, 1], [1, 11]], alternative="greater").pvalue * looked_at
+    expected = fisher_exact([[8, 0], [1, 11]], alternative="greater").pvalue * looked_at
     assert found["p_value"] == pytest.approx(expected)
 
 
