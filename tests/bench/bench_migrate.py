@@ -104,8 +104,8 @@ def dask(folder: Path, robots: int, pairs: int) -> None:
         assert scheduler.stderr is not None
         address = next(found[0] for text in scheduler.stderr if (found := re.search(r"tcp://127\.0\.0\.1:\d+", text)))
         command = [*base, "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-dashboard"]
-        for _ in range(2):
-            workers.append(subprocess.Popen([*command, "--local-directory", str(folder)], stderr=subprocess.DEVNULL))
+        command += ["--local-directory", str(folder)]
+        workers += [subprocess.Popen(command, stderr=subprocess.DEVNULL) for _ in range(2)]
         time.sleep(10)
         ratios = []
         for _ in range(pairs):
