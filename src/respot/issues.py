@@ -159,6 +159,8 @@ CODES: dict[str, tuple[Level, str]] = {
     "SAME_BASE_STAYS": (_W, "targets under a base that moves are left where they are: no matched spot is near them"),
     "SHIFT_TOO_LARGE": (_E, "a target would move further than --max-shift"),
     "RESIDUAL_TOO_LARGE": (_E, "a moved target departs from the path's rigid motion by more than --max-residual"),
+    "SNAP_UNRESOLVED": (_E, "--snap, and a weld whose name or theoretical position is not settled"),
+    "SNAPPED": (_W, "welds were put onto their theoretical positions one by one: the rigid motion is given up"),
     "EXTRAPOLATED": (_W, "a target or spot lies outside the hull of the fitted spots"),
     "SHARED_TARGET": (_E, "a target is used under several bases or by a refused program"),
     "ALREADY_APPLIED": (_E, "this calibration was applied to this source before"),

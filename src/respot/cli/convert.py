@@ -61,6 +61,14 @@ def run(
             show_default="points",
         ),
     ] = None,
+    snap: Annotated[
+        bool,
+        typer.Option(
+            "--snap",
+            help="Put each weld exactly onto its theoretical position, and blend the path between: for --theory, with "
+            "every weld of a program named. Spots no longer keep their distances.",
+        ),
+    ] = False,
     bases: Annotated[
         str,
         typer.Option(
@@ -160,6 +168,7 @@ def run(
             force,
             covariates,
             "frames" if apply == "frames" else "points" if apply == "points" else None,
+            snap,
         )
         if calibration is not None:
             if theory or measured:

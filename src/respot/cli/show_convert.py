@@ -50,6 +50,12 @@ def _show_effects(record: Mapping[str, Any]) -> None:
     ):
         if record.get(key):
             line(f"  {words}: {', '.join(record[key])}")
+    if record.get("snap"):
+        snap = record["snap"]
+        line(
+            f"  {snap['spots']} welds snapped onto their theoretical positions, by up to {snap['largest_mm']:.2f} mm "
+            f"({snap['at']}); points within {snap['plateau_mm']:g} mm of a weld along the path keep their way to it"
+        )
     for each in record.get("left_to_registration", ()):
         line(
             f"  {each['base']}: of its {each['spots']} spots a rigid motion of {each['shift_mm']:.3f} mm and "

@@ -19,6 +19,7 @@ from respot.correction.image import Image, RigidImage
 from respot.correction.images import image_of, refuse_other_state
 from respot.correction.marks import mark_of, still_applied
 from respot.correction.options import CorrectionOptions
+from respot.correction.snap import SnappedImage
 from respot.issues import BadInputError, Issue
 from respot.languages import LANGUAGES
 from respot.languages.writing import applied_calibrations, says_compensated
@@ -72,6 +73,7 @@ class Conversion:
     def as_json(self) -> dict[str, Any]:
         """Record of INTERFACES.md, `convert`, without schema, version and issues."""
         correction = self.correction
+        snaps = self.image.parts if isinstance(self.image, SnappedImage) else {}
         record: dict[str, Any] = {
             "direction": correction.direction,
             "robot": {"name": self.robot.name, "language": self.robot.language, "model": self.robot.machine.model},
@@ -88,6 +90,7 @@ class Conversion:
                     "after": edit.after,
                     "shift_mm": edit.shift_mm,
                     "turn_deg": edit.turn_deg,
+                    **({"snap_mm": snaps.get((edit.path, edit.edit.span), 0.0)} if snaps else {}),
                 }
                 for edit in correction.edits
             ],
@@ -149,6 +152,8 @@ def convert(
     if read.robot is None:
         raise BadInputError("NO_ROBOT", "is a table: only a backup or a program can be converted", str(source))
     _refuse_other_depth(read, model, options)
+    if options.inverse:
+        _refuse_snapped(read)
     image = image_of(model, fitted, read, options, str(calibration or reference))
     mark = mark_of(model, inverse=options.inverse)
     _refuse_recorded(read, _mark(mark, read.robot))
@@ -164,7 +169,7 @@ def convert(
         raise BadInputError("NO_COMMON_IDS", message, str(source))
     language = LANGUAGES[read.robot.language].with_plant(read.backup.profiles if read.backup is not None else ())
     correction = correct(read.robot, language, image, model.kind, mark, moves, options)
-    if options.covariates is not None and isinstance(image, RigidImage):
+    if options.covariates is not None and isinstance(image, RigidImage | SnappedImage):
         message = "nothing uses --covariates: no effect of this calibration follows a column"
         issues.append(Issue("OPTION_UNUSED", message, str(options.covariates)))
     refused = [
@@ -226,6 +231,22 @@ def _refuse_other_depth(source: Source, calibration: Calibration, options: Corre
     if in_tool != (options.apply == "frames"):
         where = "tool data: add --apply frames" if in_tool else "points: leave --apply frames out"
         raise BadInputError("BAD_OPTION", f"the tool offset of this calibration was written into the {where}", place)
+
+
+def _refuse_snapped(source: Source) -> None:
+    """Only the rigid part of snapped programs could be turned back: their welds were shifted one by one.
+
+    Raises
+    ------
+    BadInputError
+        ``BAD_OPTION``: the record says that they were snapped.
+    """
+    if _record(source).get("snap"):
+        message = (
+            "these programs were snapped onto a list: --inverse would turn back their rigid motion and leave what each "
+            "weld was shifted by; start from the original backup, or use respot undo after --in-place"
+        )
+        raise BadInputError("BAD_OPTION", message, str(source.path / RECORD))
 
 
 def _refuse_compensated(source: Source, robot: Robot) -> None:

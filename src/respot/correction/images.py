@@ -13,6 +13,7 @@ from respot.correction.columns import SpotColumns
 from respot.correction.compensation import Cell, Choice, Compensation
 from respot.correction.image import Image, RigidImage
 from respot.correction.options import CorrectionOptions
+from respot.correction.snap import snapped
 from respot.correction.written import Split, split
 from respot.issues import BadInputError
 from respot.kinematics.cell import Reason, RobotCell
@@ -51,11 +52,40 @@ def image_of(
         )
         raise BadInputError("BAD_OPTION", message, path)
     effects = bool(calibration.terms) or calibration.tool_offset is not None
+    if options.snap:
+        return _snapped(calibration, fitted, options, path)
     if not effects:
         return _rigid(calibration, options)
     parts = split(calibration, path, inverse=options.inverse)
     cell = _cell(calibration, parts, fitted, source, options)
     return Compensation(cell, calibration, parts, Choice(options.inverse, options.bases, options.max_residual))
+
+
+def _snapped(calibration: Calibration, fitted: SourceFit | None, options: CorrectionOptions, path: str) -> Image:
+    """Refuse what --snap cannot be joined with.
+
+    Raises
+    ------
+    BadInputError
+        ``BAD_OPTION``, and as `respot.correction.snap.snapped`.
+    """
+    reason = ""
+    if fitted is None or calibration.kind != "theory":
+        reason = "takes the positions of the list that is fitted to: give it with --theory"
+    elif options.inverse:
+        reason = "and --inverse are opposites: the list says where spots should be, not where the floor has them"
+    elif options.apply == "frames":
+        reason = "shifts each weld by itself, which no base or tool can: leave --apply frames out"
+    elif options.partial:
+        reason = "takes programs whole: a point that --partial leaves behind tears the path that is blended"
+    elif calibration.terms or calibration.tool_offset is not None:
+        reason = (
+            "shifts welds by whatever the rigid motion leaves, effects would be in it twice: leave --effects out, and "
+            "put their causes right first"
+        )
+    if reason or fitted is None:
+        raise BadInputError("BAD_OPTION", f"--snap {reason}", path)
+    return snapped(RigidImage(calibration.source2reference, "align"), fitted, options.max_residual)
 
 
 def _rigid(calibration: Calibration, options: CorrectionOptions) -> Image:

@@ -46,6 +46,8 @@ class CorrectionOptions:
     apply : str, optional
         ``points`` or ``frames``: whether the errors of whole bases and tools go into their data. None is ``points``
         where the choice does not matter to what is right.
+    snap : bool
+        Put each weld exactly onto its theoretical position, and blend the path between.
     """
 
     programs: str | None = None
@@ -60,6 +62,7 @@ class CorrectionOptions:
     any_source: bool = False
     covariates: Path | None = None
     apply: Literal["points", "frames"] | None = None
+    snap: bool = False
 
     def furthest(self, kind: str) -> tuple[float, float]:
         """Limits of a shift, mm and degrees, for a calibration of a kind."""
