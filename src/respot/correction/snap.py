@@ -9,6 +9,7 @@ program begins and ends, gets the mean of what each way asks; right before or be
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -124,8 +125,8 @@ class SnappedImage:
             move = next((move for move in moving.moves if move.weld and id(move) not in residuals), None)
             if move is not None:
                 message = (
-                    f"{move.instruction} at line {move.line} welds here, and the list has no position for it: --snap "
-                    "runs with every weld of a program named; complete the list"
+                    f"{move.instruction} at line {move.line} welds here, and where it should be is not known: the list "
+                    "lacks it, or several spots are offsets of one target. --snap runs with every weld of a program"
                 )
                 found += moving.refusals("SNAP_UNRESOLVED", message)
         return found
@@ -363,9 +364,10 @@ def snapped(rigid: RigidImage, fitted: SourceFit, max_residual: float) -> Snappe
         )
         raise BadInputError("SNAP_UNRESOLVED", message, str(fitted.reference.path))
     assert source.robot is not None  # noqa: S101 - asked before
+    held = Counter(id(move.target) for move in source.spots.moves)
     named = {
         id(move.target): name
         for name, move in zip(source.spots.ids, source.spots.moves, strict=True)
-        if move.target is not None
+        if move.target is not None and held[id(move.target)] == 1  # of several spots beside one target none is its own
     }
     return SnappedImage(rigid, source.robot, named, dict(zip(fit.ids, fit.reference, strict=True)), max_residual)
