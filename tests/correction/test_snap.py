@@ -256,19 +256,25 @@ def test_a_weld_that_the_list_lacks_leaves_its_program_as_it_was(tmp_path, line)
 
 
 def test_several_spots_beside_one_target_are_not_taken_for_each_other(tmp_path):
-    """Offsets from S8 weld S10 and S11, 12 mm apart: no residual of one may go into the other."""
-    places = {"S10": (930, 500, 800), "S11": (942, 500, 800)}
+    """Offsets from one target weld S9 and S10, 12 mm apart: no residual of one may go into the other."""
+    places = {"S9": (930, 500, 800), "S10": (942, 500, 800)}
+    shifts = {"S9": (0, -30, 0), "S10": (0, -42, 0)}
     way = "".join(
-        f"    SpotL Offs(S8,0,{-dx},0),v800,gun1,sd1,tGun\\WObj:=wDoor; ! {name}\n"
-        for name, dx in (("S10", 30), ("S11", 42))
+        f"    SpotL Offs(P8,{x},{y},{z}),v800,gun1,sd{name},tGun\\WObj:=wDoor;\n" for name, (x, y, z) in shifts.items()
     )
+    point = f"  CONST robtarget P8:={robtarget(*krl_in_base1(WELDS['S8']))};\n"
+    point += "".join(f"  PERS spotdata sd{name}:=[1,2000,1,0];\n" for name in (*WELDS, *places))
+    files = rapid_line(way, point)
+    path = next(path for path in files if path.endswith("Weld.mod"))
+    files[path] = re.sub(r"SpotL (S\d),v800,gun1,sd1", r"SpotL \1,v800,gun1,sd\1", files[path])
     listed = theory(tmp_path)
     with listed.open("a") as file:
         for name, place in places.items():
             file.write(f"{name}," + ",".join(f"{v:.4f}" for v in moved(place)) + "\n")
-    done = convert(tmp_path, rapid_line(way), reference=listed)
+    done = convert(tmp_path, files, "--spot-id", r"sd(S\d+)", reference=listed)
+    assert done.record["fit"]["n_matched"] == 10
     assert done.code == 1
-    assert {item["code"] for item in done.record["refused"]} & {"SNAP_UNRESOLVED", "SHARED_TARGET"}
+    assert {(item["target"], item["code"]) for item in done.record["refused"]} == {("P8", "SNAP_UNRESOLVED")}
     assert not done.record["edits"]
 
 
