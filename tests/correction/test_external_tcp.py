@@ -79,9 +79,21 @@ def test_krl_a_held_gun_with_a_point_the_other_way_round_refuses_the_program(tmp
     assert done.refusals() == {("weld", "XP1", "EXTERNAL_TCP")}
 
 
-def test_krl_a_shift_along_the_base_of_a_fixed_gun_is_refused(tmp_path):
-    done = convert(tmp_path, krl_held_part(body="LIN_REL {Z 5.0} #BASE\n"))
+@pytest.mark.parametrize("way", ["LIN_REL {Z 5.0} #BASE\n", "LIN_REL {Z 5.0} #TOOL\n", "CIRC_REL {Z 5.0},{X 5.0}\n"])
+def test_krl_a_shift_along_a_fixed_gun_is_refused(tmp_path, way):
+    done = convert(tmp_path, krl_held_part(body=way))
     assert {code for _, _, code in done.refusals()} == {"EXTERNAL_TCP"}
+    assert not done.edited()
+
+
+def test_krl_a_shift_along_the_tool_is_refused_where_nobody_knows_what_the_robot_holds(tmp_path):
+    """Along a gun that it holds the way turns with its target, along a part it might not."""
+    files = krl_held_part()
+    files["KRC/R1/Program/weld.src"] = files["KRC/R1/Program/weld.src"].replace(
+        "END\n", "Strange( )\nLIN_REL {Z 5.0} #TOOL\nEND\n"
+    )
+    done = convert(tmp_path, files)
+    assert {code for _, _, code in done.refusals()} == {"UNKNOWN_MODE"}
     assert not done.edited()
 
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 
 from scipy.spatial.transform import RigidTransform
 
-from respot.geometry import distance_mm, turn_deg
+from respot.geometry import IDENTITY, distance_mm, turn_deg
 from respot.program.frames import Frame
 from respot.program.moves import Move
 from respot.program.robot import Robot, Routine, Unread
@@ -26,6 +26,7 @@ from respot.tolerance import SAME_POSITION_MM, SAME_ROTATION_DEG
 
 #: A literal position within a statement that no rule knows: ``[[1,2,3],..``, ``{X 1,..``, ``{E6POS: X 1,..``.
 _POSE = re.compile(r"\[\s*\[|\{\s*(?:\w+\s*:)?\s*[XYZ]\s", re.IGNORECASE)
+_WAY_OF_PART = "a shift of the part along a fixed gun: it is not documented along which axes it goes"
 #: Doubts that tell why it is not known what carries the part.
 _OF_FRAMES = ("UNKNOWN_FRAME", "UNKNOWN_MODE", "UNKNOWN_TOOL")
 _NAME = re.compile(r"[^\W\d][\w$]*(?:\[[\d,]+\])?(?:\.\w+)*")
@@ -215,7 +216,10 @@ class _Finder:
         if move.target is not None and move.target.kind is TargetKind.JOINTS:
             return None
         if move.target is None and move.offset is None:
-            return refuse(_code_of(move), move.unknown) if move.unknown else None
+            if move.unknown:
+                return refuse(_code_of(move), move.unknown)
+            in_tool = move.external_tcp and move.tool_offset is not IDENTITY and self._robot.language == "krl"
+            return refuse("EXTERNAL_TCP", _WAY_OF_PART) if in_tool and self._is_matched(move, routine.task) else None
         if move.workpiece is None:
             what = "what the robot holds" if move.external_tcp else "the base of this motion"
             told = [doubt.text for doubt in move.doubts if doubt.code in _OF_FRAMES]
@@ -246,8 +250,7 @@ class _Finder:
         if not self._moves(move, routine):
             return None
         if move.offset is not None and move.external_tcp and self._robot.language == "krl":
-            message = "a shift along the base of a fixed gun: it is not documented along which axes the part moves"
-            return refuse("EXTERNAL_TCP", message)
+            return refuse("EXTERNAL_TCP", _WAY_OF_PART)
         if move.unknown:
             return refuse(_code_of(move), move.unknown)
         if move.target is not None and move.target.pose is None:

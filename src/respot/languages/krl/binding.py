@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
+from respot.geometry import IDENTITY
 from respot.issues import Issue
 from respot.languages.forms import Forms
 from respot.languages.krl.blocks import Routine as Block
@@ -206,6 +207,9 @@ class Binder:
             doubts.append(
                 Doubt("RUN_TIME_SHIFT", f"what shifts {target or draft.instruction} is computed while the robot runs")
             )
+        if draft.relative and target is None and draft.operand.tool_offset is not IDENTITY:
+            unknown = unknown or self._unknown_hands(state)
+            doubts += [Doubt("UNKNOWN_MODE", unknown)] if unknown and not doubts else []
         if needs_base:
             doubts += self._doubts(state)
             if isinstance(state.external, Why):
@@ -233,6 +237,13 @@ class Binder:
             doubts=tuple(doubts),
         )
 
+    @staticmethod
+    def _unknown_hands(state: State) -> str:
+        """Say why it is not known whether the robot holds the gun or the part; empty where it is."""
+        if not isinstance(state.external, Why):
+            return ""
+        return f"whether the robot holds the gun or the part is not known: {state.external.reason}"
+
     def _doubts(self, state: State) -> list[Doubt]:
         """What is not known of the frames of a motion to a pose."""
         found: list[Doubt] = []
@@ -243,8 +254,7 @@ class Binder:
                 found.append(Doubt(code, f"{what} {frame}: {frame.unknown}"))
         if isinstance(state.external, Why):
             if state.external != state.base:
-                message = f"whether the robot holds the gun or the part is not known: {state.external.reason}"
-                found.append(Doubt("UNKNOWN_MODE", message))
+                found.append(Doubt("UNKNOWN_MODE", self._unknown_hands(state)))
         elif isinstance(state.tool, Frame) and isinstance(state.base, Frame):
             conflict = mode_conflict(self._frames.typed(state.tool), self._frames.typed(state.base), state.external)
             if conflict:

@@ -170,6 +170,8 @@ class Operands:
         if text.startswith("$"):
             return _unknown(f"{text} has its value while the robot runs")
         bare = bare_name(text.upper())
+        if self._run_time.is_from_pose(bare, place.module):
+            return _unknown(f"{text} is set to joints that are computed from a position")
         if bare in place.parameters:
             return _unknown(_parameter(text, bare, place))
         if bare in place.local:

@@ -153,6 +153,8 @@ class RunTime:
         Directions of the parameters of every routine of a name, in upper case; empty for by reference.
     framing : set of str
         Routines, in upper case, with a harmless name whose code in this backup sets frames all the same.
+    from_poses : set of (str, str)
+        Module and name, in upper case, of data that are set to the joints of a position (``XJ=INVERSE(XP1,..)``).
     external_tcp : bool
         Something in the backup asks for the external TCP.
     """
@@ -164,6 +166,7 @@ class RunTime:
     passed: dict[str, list[Passed]] = field(default_factory=dict)
     heads: dict[str, list[list[str]]] = field(default_factory=dict)
     framing: set[str] = field(default_factory=set)
+    from_poses: set[tuple[str, str]] = field(default_factory=set)
     external_tcp: bool = False
     _written: dict[str, dict[str, _Elements]] = field(default_factory=dict)
     _switched: set[str] = field(default_factory=set)
@@ -198,6 +201,14 @@ class RunTime:
             return ""
         value = symbol.value.value
         return str(int(value)) if value == int(value) else ""
+
+    def is_from_pose(self, name: str, module: str) -> bool:
+        """Whether code sets what a module knows by a name to the joints of a position, which moves if that does."""
+        owner = self.symbols.owner(name, module)
+        return any(
+            other == name and (there == module or (owner is not None and self.symbols.owner(name, there) == owner))
+            for there, other in self.from_poses
+        )
 
     def switches_on(self, name: str) -> bool:
         """Whether any code sets a switch to something other than FALSE."""
@@ -350,6 +361,8 @@ class _Reader:
     def _assignment(self, assignment: Node) -> None:
         name = left_of(assignment)
         self._write(name)
+        if any(called.tokens("NAME")[0].text.upper() == "INVERSE" for called in assignment.all("function_call")):
+            self._found.from_poses.add((self._module, bare_name(name)))
         if name.endswith("_ON"):
             self._found.add_value(name, assignment.nodes[-1].text)
 

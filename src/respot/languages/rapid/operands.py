@@ -13,7 +13,7 @@ from respot.languages.rapid.blocks import Routine as Block
 from respot.languages.rapid.calls import Argument
 from respot.languages.rapid.records import BUILT_IN, POSITIONS
 from respot.languages.rapid.references import Datum, resolve
-from respot.languages.rapid.run_time import RunTime
+from respot.languages.rapid.run_time import JOINTS_OF_POSE, RunTime
 from respot.languages.rapid.symbols import Module, Symbol, Task
 from respot.languages.rapid.targets import Keys, Targets, holds_positions
 from respot.program.moves import BaseOffset
@@ -122,6 +122,16 @@ class Operands:
         if node.kind == "function_call" and depth < _DEEPEST:
             return self._function(node, place, kind, depth)
         return None
+
+    def joints_from_pose(self, node: Node, place: Place) -> str:
+        """Say which joints are those of a position, and go elsewhere if it moves; empty of all others."""
+        names = node.tokens("NAME")
+        if node.kind == "function_call" and names and names[0].text.lower() == JOINTS_OF_POSE:
+            return f"{node.text} goes to joints that are computed from a position"
+        datum = resolve(node, self._task, place.module, place.local) if node.kind == "reference" else None
+        if datum is not None and datum.symbol.key in self._run_time.from_poses:
+            return f"{node.text} is set to joints that are computed from a position"
+        return ""
 
     def _named(self, node: Node, place: Place, kind: str, keys: Keys) -> Operand | None:
         datum = resolve(node, self._task, place.module, place.local)

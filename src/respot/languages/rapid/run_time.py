@@ -28,6 +28,8 @@ _WRITING = frozenset(
 )  # fmt: skip
 #: What a statement that no rule knows assigns to; an argument such as ``\WObj:=`` is none.
 _ASSIGNED = re.compile(r"(?<![\w.\\])([A-Za-z]\w*)(?:\s*\{[^}]{0,200}\})?(?:\s*\.\s*\w+){0,9}\s*:=")
+#: Makes joints of a position, which move if the position does.
+JOINTS_OF_POSE = "calcjointt"
 _BY_NAME = frozenset(("setdataval", "setalldataval"))
 _BY_REFERENCE = frozenset(("INOUT", "VAR", "PERS"))
 #: What a datum that is set by a computed name may be, where the value does not tell its type.
@@ -46,6 +48,8 @@ class RunTime:
         Type and first letters of data that are set by a name that is computed, in lower case.
     changed : dict
         Parameters, in lower case, that each routine changes, by the identity of its block.
+    from_poses : set of tuple
+        Keys of data that are set to the joints of a position (``jt:=CalcJointT(p10,..)``).
     shared : dict
         Persistent data that several tasks declare, by name and type.
     shared_written : set of (str, str)
@@ -55,6 +59,7 @@ class RunTime:
     written: set[tuple[str, int, str]] = field(default_factory=set)
     by_type: set[tuple[str, str]] = field(default_factory=set)
     changed: dict[int, frozenset[str]] = field(default_factory=dict)
+    from_poses: set[tuple[str, int, str]] = field(default_factory=set)
     shared: Mapping[tuple[str, str], Sequence[Symbol]] = field(default_factory=dict)
     shared_written: set[tuple[str, str]] = field(default_factory=set)
 
@@ -129,8 +134,12 @@ class _Reader:
     def _read_routine(self, block: Block, module: Module) -> None:
         local = self.task.locals(block, module)
         for line in module.lines(block):
+            joints = any(call.name.lower() == JOINTS_OF_POSE for call in line.calls)
             for name, _ in line.assigned:
-                self._change(self.task.find(name, module, local), block)
+                symbol = self.task.find(name, module, local)
+                self._change(symbol, block)
+                if joints and symbol is not None:
+                    self.run_time.from_poses.add(symbol.key)
             for call in line.calls:
                 self._read_call(call, block, module, local)
         for statement in block.body:

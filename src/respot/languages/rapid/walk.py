@@ -350,7 +350,9 @@ class Walk:
         operands = [self._read(node, call, kind) for node in nodes] or [None]
         if not form.joints:
             return operands
-        return [_of_joints(operand) for operand in operands]
+        reasons = [self._context.operands.joints_from_pose(node, self._place(call)) for node in nodes]
+        told = [Operand(None, reason, "RUN_TIME_POSE") for reason in reasons if reason]
+        return told or [_of_joints(operand) for operand in operands]
 
     def _tool(
         self,
