@@ -180,6 +180,20 @@ def test_a_column_that_is_not_known_of_the_spots(tmp_path):
 # --- calibrations without rivals
 
 
+def test_rivals_that_lose_clearly_already(tmp_path):
+    line = simulate("kr210_r2700_extra", 60, 0.1, ["gun_sag:2"], 3, columns=False)
+    for path, content in files_of(line).items():
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / path).write_bytes(content)
+    subset(tmp_path, set(line.ids[:40]), "first.csv")
+    ran("fit", tmp_path / "backup", "--measured", tmp_path / "first.csv", "--noise", 0.1, "-o", tmp_path / "cal.json")
+    told = planned(tmp_path, count=3)
+    said = [issue["message"] for issue in told["issues"] if issue["code"] == "NOTHING_TO_SEPARATE"]
+    assert "loses clearly already" in said[0]
+    assert len(told["spots"]) == 3
+    assert told["parameters"]
+
+
 def test_every_spot_is_measured_already(respot, theory):
     respot("fit", SAMPLES / "kuka", "--theory", theory, "-o", "cal.json")
     told = respot("plan", SAMPLES / "kuka", "-c", "cal.json", "--count", 3, "--json")
@@ -216,7 +230,7 @@ def test_a_calibration_of_an_older_version(corner, tmp_path, respot):
     (tmp_path / "old.json").write_text(json.dumps(record))
     told = respot("plan", corner / "backup", "-c", "old.json", "--count", 2, "--json").json
     said = [issue["message"] for issue in told["issues"] if issue["code"] == "NOTHING_TO_SEPARATE"]
-    assert "without their rivals" in said[0]
+    assert "keeps no rivals" in said[0]
     assert len(told["spots"]) == 2
     del record["precision"], record["precision_hash"]
     (tmp_path / "old.json").write_text(json.dumps(record))

@@ -77,6 +77,17 @@ def test_calibrated_spots_lie_where_the_fit_says(robot, converted):
         assert np.abs(world[:3, 3] - [spot["x"], spot["y"], spot["z"]]).max() < 1e-4
 
 
+def test_snapped_welds_lie_where_the_theory_says(robot, theory, tmp_path):
+    code, out, err = run("convert", robot.root, "--theory", theory, "--snap", "-o", tmp_path / "out", "--json")
+    assert code == 0, err
+    record, listed = json.loads(out), table(theory)
+    assert record["snap"]["spots"] == len(record["fit"]["spots"]) == 14
+    new = {name.split(".")[1]: point for name, point in robot.read(tmp_path / "out").items()}
+    for spot in record["fit"]["spots"]:
+        world = new[spot["id"]].base @ new[spot["id"]].pose
+        assert np.abs(world[:3, 3] - listed[spot["reference_id"]]).max() < 1e-4
+
+
 def test_offsets_along_the_base_turn(robot, converted):
     folder, record = converted
     transform = np.array(record["fit"]["transform"]["rotation"])

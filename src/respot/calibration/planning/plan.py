@@ -367,11 +367,8 @@ def _issues(calibration: Calibration, plan: Plan, count: int, source: Source) ->
             "noise, and a mean of repeats is surer; it does not turn the tool or move the arm"
         )
         issues.append(Issue("FEW_CANDIDATES", message, path))
-    if calibration.information is None:
-        what = "has effects, and was stored without their rivals: fit it again to plan for them"
-        if not calibration.terms and calibration.tool_offset is None:
-            what = "has no effect, so there is nothing to tell apart"
-        message = f"{what}; the spots are those that make the model surer where it is least sure"
+    if calibration.information is None or not calibration.information.rivals:
+        message = f"{_why_nothing(calibration)}; the spots are those that make the model surer where it is least sure"
         issues.append(Issue("NOTHING_TO_SEPARATE", message))
     for each in plan.unasked:
         message = (
@@ -389,3 +386,15 @@ def _issues(calibration: Calibration, plan: Plan, count: int, source: Source) ->
         )
         issues.append(Issue("NOT_SEPARABLE", message, path))
     return issues
+
+
+def _why_nothing(calibration: Calibration) -> str:
+    """Why there is nothing to tell apart."""
+    if calibration.information is not None:
+        return "every rival of its effects loses clearly already, so there is nothing to tell apart"
+    if all(not term.parameters for term in calibration.terms) and calibration.tool_offset is None:
+        return "it has no effect that is fitted, so there is nothing to tell apart"
+    return (
+        "it has effects and keeps no rivals of them: it was stored by an older version, or fitted to too few spots to "
+        "look for them; fit it again to plan for them"
+    )
