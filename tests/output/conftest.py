@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from tests.correction.small import krl
-from tests.output.runs import Runner, calibration, warmed, write
+from tests.output.runs import CLI, Runner, calibration, in_process, warmed, write
 
 #: Files beside the programs, so that writing takes its time.
 MORE = {
@@ -28,3 +28,10 @@ def cal(tmp_path: Path) -> Path:
 def respot(tmp_path: Path, backup: Path, cal: Path) -> Iterator[Runner]:
     with warmed(tmp_path, "convert", backup, "-c", cal, "--dry-run") as runner:
         yield runner
+
+
+@pytest.fixture
+def cli(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> CLI:
+    """Runs a command in this process."""
+    monkeypatch.chdir(tmp_path)
+    return in_process

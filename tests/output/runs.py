@@ -6,12 +6,15 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from typer.testing import CliRunner
+
 from respot.calibration.calibration import Calibration
+from respot.cli import app
 from tests.correction.small import SHIFT, SPOTS, TURN
 
 DRIVER = Path(__file__).parent / "driver.py"
@@ -106,3 +109,24 @@ def state(folder: Path, times: bool = True) -> State:
         data = b"" if path.is_dir() else path.read_bytes()
         found[path.relative_to(folder).as_posix()] = (data, about.st_mode, about.st_mtime_ns if times else 0)
     return found
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a command in this process said."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def json(self) -> dict:
+        return json.loads(self.out)
+
+
+CLI = Callable[..., Result]
+
+
+def in_process(*arguments: object) -> Result:
+    result = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    return Result(result.exit_code, result.stdout, result.stderr)

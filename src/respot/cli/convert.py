@@ -211,7 +211,6 @@ def convert_to(
     """Convert and write, unless it is a dry run."""
     from respot.cli.show_convert import show_conversion
     from respot.correction.conversion import convert, record_of
-    from respot.languages.overlay import check_overlay
     from respot.output import check_in_place, check_output, rehearse, write_backup, write_in_place
 
     if output is not None and in_place:
@@ -219,8 +218,6 @@ def convert_to(
     if output is None and not in_place and not dry_run:
         message = "give the new folder with -o OUTDIR; or --in-place to change the backup itself, or --dry-run"
         raise BadInputError("BAD_OPTION", message)
-    if chosen.templates is not None:
-        check_overlay(chosen.templates)
     if in_place:
         check_in_place(source)
     if output is not None:

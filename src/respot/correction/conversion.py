@@ -22,6 +22,7 @@ from respot.correction.options import CorrectionOptions
 from respot.correction.snap import SnappedImage
 from respot.issues import BadInputError, Issue
 from respot.languages import LANGUAGES
+from respot.languages.overlay import check_overlay
 from respot.languages.writing import applied_calibrations, says_compensated
 from respot.program.moves import Move
 from respot.program.robot import Robot
@@ -137,6 +138,8 @@ def convert(
     BadInputError
         Anything that makes a correct conversion impossible as a whole.
     """
+    if options.templates is not None:
+        check_overlay(options.templates)
     if reference is not None:
         fitted = fit_source(source, reference, fit_options)
         model, read, issues = fitted.fit.calibration, fitted.source, list(fitted.issues)
@@ -258,8 +261,10 @@ def _refuse_compensated(source: Source, robot: Robot) -> None:
         ``ALREADY_APPLIED``: the record, or a file's header, says that they are.
     """
     last = _record(source)
-    calibration = last.get("calibration")
+    calibration, files = last.get("calibration"), last.get("files")
     kind = calibration.get("kind") if isinstance(calibration, dict) else None
+    if isinstance(files, dict) and files and not set(files) & set(robot.files):
+        kind = None  # in place, the last conversion of a tree may have been that of another robot in it
     place = str(source.path / RECORD) if (last.get("direction"), kind) == ("compensate", "measured") else None
     headed = (path for path, file in robot.files.items() if says_compensated(file.source))
     place = place or next(headed, None)

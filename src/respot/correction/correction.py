@@ -209,8 +209,6 @@ class _Kept:
 
 
 def _check_options(robot: Robot, options: CorrectionOptions) -> None:
-    if options.templates is not None and not options.templates.is_dir():
-        raise BadInputError("BAD_OPTION", "--templates is no folder", str(options.templates))
     wanted = options.programs
     if wanted is not None and not any(fnmatchcase(name.lower(), wanted.lower()) for name in robot.programs):
         known = ", ".join(robot.programs[:10])

@@ -109,28 +109,31 @@ def mirror(old: Path, new: Path) -> None:
     Raises
     ------
     BadInputError
-        ``CANNOT_WRITE`` where another disk is mounted inside: it would not come along.
+        ``UNSAFE_ARCHIVE`` for a link inside; ``CANNOT_WRITE`` where another disk is mounted inside.
     """
     device = old.stat().st_dev
     for here, folders, names in os.walk(old, onerror=_raise):
         below = Path(here)
         there = new / below.relative_to(old)
         there.mkdir()
-        links = [name for name in folders if (below / name).is_symlink()]
+        for name in (*folders, *names):
+            if (below / name).is_symlink():
+                message = "is a link: what is written through it would land elsewhere. Nothing was changed"
+                raise BadInputError("UNSAFE_ARCHIVE", message, str(below / name))
         for name in folders:
-            if name not in links and (below / name).stat().st_dev != device:
+            if (below / name).stat().st_dev != device:
                 message = "is another disk inside the backup; copy the backup to one disk. Nothing was changed"
                 raise BadInputError("CANNOT_WRITE", message, str(below / name))
-        for name in (*names, *links):
+        for name in names:
             link(below / name, there / name)
 
 
 def link(file: Path, other: Path) -> None:
     """Make a hard link of a file, or a copy with its times and rights where there can be none."""
     try:
-        os.link(file, other, follow_symlinks=False)
-    except (OSError, NotImplementedError):
-        shutil.copy2(file, other, follow_symlinks=False)
+        os.link(file, other)
+    except OSError:
+        shutil.copy2(file, other)
         own(file, other)
 
 
@@ -146,10 +149,10 @@ def look_alike(old: Path, new: Path) -> None:
 def own(old: Path, new: Path) -> None:
     """Give a file the owner of another one, where this account may."""
     if sys.platform != "win32":
-        before, after = old.lstat(), new.lstat()
+        before, after = old.stat(), new.stat()
         if (before.st_uid, before.st_gid) != (after.st_uid, after.st_gid):
             with suppress(PermissionError):
-                os.chown(new, before.st_uid, before.st_gid, follow_symlinks=False)
+                os.chown(new, before.st_uid, before.st_gid)
 
 
 def remove(folder: Path) -> None:
