@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,9 +15,13 @@ MORE = {
 }
 
 
+def _backup(folder: Path) -> Path:
+    return write(folder / "backup", krl(more={Path(path).name: text for path, text in MORE.items()}))
+
+
 @pytest.fixture
 def backup(tmp_path: Path) -> Path:
-    return write(tmp_path / "backup", krl(more={Path(path).name: text for path, text in MORE.items()}))
+    return _backup(tmp_path)
 
 
 @pytest.fixture
@@ -24,10 +29,17 @@ def cal(tmp_path: Path) -> Path:
     return calibration(tmp_path / "cal.json")
 
 
+@pytest.fixture(scope="module")
+def driver(tmp_path_factory: pytest.TempPathFactory) -> Iterator[subprocess.Popen]:
+    folder = tmp_path_factory.mktemp("warm")
+    with warmed("convert", _backup(folder), "-c", calibration(folder / "cal.json"), "--dry-run") as process:
+        yield process
+
+
 @pytest.fixture
-def respot(tmp_path: Path, backup: Path, cal: Path) -> Iterator[Runner]:
-    with warmed(tmp_path, "convert", backup, "-c", cal, "--dry-run") as runner:
-        yield runner
+def respot(driver: subprocess.Popen, tmp_path: Path) -> Runner:
+    """Runs a command in a child of a warmed process."""
+    return Runner(driver, tmp_path)
 
 
 @pytest.fixture

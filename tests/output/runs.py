@@ -59,7 +59,7 @@ class Runner:
 
 
 @contextmanager
-def warmed(folder: Path, *warm: object) -> Iterator[Runner]:
+def warmed(*warm: object) -> Iterator[subprocess.Popen]:
     """Start the driver; ``warm`` is a command that imports and caches what later ones need."""
     import respot
 
@@ -69,14 +69,13 @@ def warmed(folder: Path, *warm: object) -> Iterator[Runner]:
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
-        cwd=folder,
         env={**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"},
     )
     try:
         process.stdin.write(json.dumps({"warm": True, "arguments": [str(argument) for argument in warm]}) + "\n")
         process.stdin.flush()
         assert json.loads(process.stdout.readline()) == {"code": 0}
-        yield Runner(process, folder)
+        yield process
     finally:
         process.stdin.close()
         process.wait(timeout=60)

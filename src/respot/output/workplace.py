@@ -86,7 +86,9 @@ class Workplace:
 
     def shown(self, path: Path) -> Path:
         """Name of a file for people: where it was going to lie."""
-        return self.target / path.relative_to(self.new) if self.new in path.parents else path
+        if self.new in path.parents:
+            return self.target / path.relative_to(self.new)
+        return self.target if self.root in (path, *path.parents) else path
 
 
 @contextmanager
