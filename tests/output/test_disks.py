@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.output.runs import Runner, state
+from tests.output.runs import SAMPLES, Runner, state
 
 
 def listed(folder: Path) -> list[str]:
@@ -264,3 +264,33 @@ def test_what_is_proved_was_waited_for_and_moves_with_its_record(respot: Runner,
         assert not {"write_bytes", "link", "mkdir"} & set(ended.steps[proved:])
         assert {"rename", "exchange"} & set(ended.steps) == {rename} and ended.steps.count(rename) == 1
         assert ended.steps[moved + 1] == "fsync"
+
+
+@pytest.mark.parametrize("command", ["fit", "diff", "predict", "predict_xlsx"])
+def test_a_file_beside_the_answer_is_whole_or_as_it_was(respot: Runner, tmp_path, command):
+    theory, name = SAMPLES / "theory.csv", f"made.{'xlsx' if command == 'predict_xlsx' else 'txt'}"
+    made = tmp_path / (name if command != "predict" else "made.csv")
+    assert respot("fit", SAMPLES / "kuka", "--theory", theory, "-o", tmp_path / "cal.json").code == 0
+    arguments = {
+        "fit": ["fit", SAMPLES / "kuka", "--theory", theory, "-o", made],
+        "diff": ["diff", SAMPLES / "kuka", SAMPLES / "kuka", "--html", made],
+    }.get(command, ["predict", SAMPLES / "kuka", "-c", tmp_path / "cal.json", "-o", made])
+    made.write_text("of yesterday")
+    refused(respot(*arguments, "--force", largest_file=600), made, "CANNOT_WRITE", "File too large")
+    assert made.read_text() == "of yesterday"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cal.json", made.name]
+    assert respot(*arguments, "--force").code == 0
+    assert made.stat().st_size > 600
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cal.json", made.name]
+
+
+def test_a_link_or_a_pipe_that_is_written_to_stays_one(respot: Runner, tmp_path):
+    theory = SAMPLES / "theory.csv"
+    (tmp_path / "real.json").write_text("of yesterday")
+    (tmp_path / "link.json").symlink_to(tmp_path / "real.json")
+    (tmp_path / "null").symlink_to("/dev/null")
+    for name in ("link.json", "null"):
+        assert respot("fit", SAMPLES / "kuka", "--theory", theory, "-o", tmp_path / name, "--force").code == 0
+        assert (tmp_path / name).is_symlink()
+    assert json.loads((tmp_path / "real.json").read_text())["kind"] == "theory"
+    assert Path("/dev/null").is_char_device()

@@ -27,17 +27,17 @@ def check_free(path: Path | None, option: str, inputs: Sequence[Path], force: bo
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file.
+    """Write a text file whole, or not at all.
 
     Raises
     ------
     BadInputError
-        ``CANNOT_READ`` if it cannot be written.
+        ``CANNOT_WRITE``.
     """
-    try:
-        path.write_text(text, encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise BadInputError("CANNOT_READ", f"cannot be written: {error.strerror}", str(path)) from error
+    from respot.output.disk import replacing
+
+    with replacing(path) as part:
+        part.write_text(text, encoding="utf-8", newline="\n")
 
 
 def holds(source: Path, output: Path) -> bool:

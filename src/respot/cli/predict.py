@@ -101,8 +101,9 @@ def write(path: Path, prediction: Prediction) -> None:
     Raises
     ------
     BadInputError
-        ``CANNOT_READ`` if it cannot be written; as `respot.tables.write_table`.
+        ``CANNOT_WRITE``; as `respot.tables.write_table`.
     """
+    from respot.output.disk import replacing
     from respot.tables import write_table
 
     rows = prediction.to_dict()
@@ -111,7 +112,5 @@ def write(path: Path, prediction: Prediction) -> None:
         for name in ("ci95", "ci95_new", "leverage")
     }
     columns["extrapolated"] = [None if row["extrapolated"] is None else int(row["extrapolated"]) for row in rows]
-    try:
-        write_table(path, prediction.ids, prediction.positions, prediction.rotations, columns=columns)
-    except OSError as error:
-        raise BadInputError("CANNOT_READ", f"cannot be written: {error.strerror}", str(path)) from error
+    with replacing(path) as part:
+        write_table(part, prediction.ids, prediction.positions, prediction.rotations, columns=columns)

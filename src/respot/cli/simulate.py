@@ -146,4 +146,4 @@ def _write(folder: Path, files: Iterable[tuple[str, bytes]]) -> None:
 
 
 def _cannot(folder: Path, error: OSError) -> BadInputError:
-    return BadInputError("BAD_OPTION", f"cannot be written: {error.strerror or error}", str(folder))
+    return BadInputError("CANNOT_WRITE", f"cannot be written: {error.strerror or error}", str(folder))

@@ -8,8 +8,8 @@ import os
 import shutil
 import stat
 import sys
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
@@ -59,6 +59,33 @@ def write(path: Path, data: bytes) -> None:
     except OSError as error:
         error.filename = str(path)
         raise
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Write one file whole or not at all: it is written beside its place, under the name that this yields.
+
+    Raises
+    ------
+    BadInputError
+        ``CANNOT_WRITE``; what was there is as it was.
+    """
+    place = path.resolve()  # a link stays one
+    if place.exists() and not place.is_file():  # a pipe or a terminal has no place to move to
+        yield path
+        return
+    part = place.with_name(f".{place.stem}.part{place.suffix}")
+    try:
+        try:
+            yield part
+            _sync(part, os.O_RDWR if sys.platform == "win32" else os.O_RDONLY)
+            part.replace(place)
+        finally:
+            part.unlink(missing_ok=True)
+    except OSError as error:
+        raise cannot_write(error, path) from error
+    except BadInputError as error:
+        raise BadInputError(error.issue.code, error.issue.message, str(path)) from error
 
 
 def flush(folder: Path) -> None:
