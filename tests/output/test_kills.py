@@ -213,6 +213,47 @@ def test_where_folders_cannot_change_places_the_next_run_puts_back_what_a_kill_t
     assert sorted(path.name for path in tmp_path.iterdir()) == ["backup", "cal.json", "new", "old"]
 
 
+def test_a_folder_that_comes_back_is_not_replaced_without_force(respot, tmp_path, backup, cal):
+    out = tmp_path / "out"
+    assert respot("convert", backup, "-c", cal, "-o", out).code == 0
+    older = state(out)
+    (backup / "KRC" / "R1" / "Program" / "late.txt").write_text("came later")
+    arguments = ("convert", backup, "-c", cal, "-o", out)
+    whole = respot(*arguments, "--force", no_exchange=True)
+    shutil.rmtree(out)
+    (backup / "KRC" / "R1" / "Program" / "late.txt").unlink()
+    assert respot(*arguments).code == 0
+    (backup / "KRC" / "R1" / "Program" / "late.txt").write_text("came later")
+    first = whole.steps.index("rename") + 1
+    older = state(out)
+    assert respot(*arguments, "--force", no_exchange=True, kill={"step": first, "moment": "after"}).killed
+    assert not out.exists()
+    refused = respot(*arguments)
+    assert (refused.code, "OUTPUT_EXISTS" in refused.err) == (2, True)
+    assert state(out) == older
+
+
+def test_undo_of_a_new_folder_that_is_killed_leaves_all_of_it_or_nothing(respot, tmp_path, backup, cal):
+    out, kept = tmp_path / "out", tmp_path / "kept"
+    assert respot("convert", backup, "-c", cal, "-o", kept).code == 0
+    complete = state(kept, times=False)
+    found: Counter[bool] = Counter()
+
+    def start() -> None:
+        shutil.rmtree(out, ignore_errors=True)
+        shutil.copytree(kept, out)
+
+    def check(ended: Ended) -> None:
+        found[out.exists()] += 1
+        assert not out.exists() or state(out, times=False) == complete
+        again = respot("undo", out)
+        assert again.code == (0 if found[True] and not again.err else 2)
+        assert not out.exists()
+
+    killed_at_all(respot, ("undo", out), start, check, out, KILLS // 3)
+    assert found[True] and found[False]
+
+
 def check_or_absent(folder: Path, states: list[State]) -> int | None:
     return check_one_of(folder, states) if folder.exists() else None
 

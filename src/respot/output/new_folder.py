@@ -71,8 +71,8 @@ def write_backup(
     VerifyError
         What was written is not what was intended; nothing is left behind.
     """
-    check_output(folder, force)
     with workplace(folder.absolute()) as place:
+        check_output(folder, force)  # now that no other run writes there, and what a killed one took away is back
         said = record_bytes(record)
         for path, data in {**files, **correction.files, RECORD: said}.items():
             write(place.new / path, data)

@@ -156,7 +156,7 @@ def _lock(root: Path) -> int:
     for _ in range(_MOST_TRIES):
         with suppress(FileExistsError):
             root.mkdir()
-        if root.is_dir() and not (root / _LOCK).exists() and any(root.iterdir()):
+        if _LOCK not in (names := _names(root)) and names:
             message = f"{root} is in the way, and not of respot: move it, or name another folder. Nothing was changed"
             raise BadInputError("CANNOT_WRITE", message, str(root))
         try:
@@ -176,6 +176,14 @@ def _lock(root: Path) -> int:
             raise
         os.close(handle)
     raise _in_use(root)
+
+
+def _names(root: Path) -> list[str]:
+    """Names in a workplace; none if it has just gone."""
+    try:
+        return [path.name for path in root.iterdir()]
+    except FileNotFoundError:
+        return []
 
 
 def _claim(handle: int, root: Path) -> None:
@@ -224,11 +232,15 @@ def _is(handle: int, path: Path) -> bool:
 
 
 def _unlock(root: Path, handle: int) -> None:
-    """Let a workplace go: its name first, so that nobody takes a lock that is no longer seen."""
+    """Let a workplace go: its name first, so that nobody takes a lock that is no longer seen.
+
+    What could not be removed keeps its lock file, by which the next run knows whose it is.
+    """
     if sys.platform == "win32":  # an open file cannot be removed there
         os.close(handle)
     with suppress(OSError):
-        (root / _LOCK).unlink()
+        if _names(root) == [_LOCK]:
+            (root / _LOCK).unlink()
     if sys.platform != "win32":
         os.close(handle)
     with suppress(OSError):
