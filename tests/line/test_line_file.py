@@ -86,7 +86,7 @@ def test_every_long_option_of_fit_and_convert_is_a_key(command):
         (HEAD + ROBOT + "method = 'best'\n", "BAD_LINE_FILE", 7, '"robust" or "paper"'),
         (HEAD + ROBOT + "method = 'affine'\n", "BAD_LINE_FILE", 7, "no rigid motion"),
         (HEAD + ROBOT + "tau = 3.0\n", "BAD_LINE_FILE", 7, "paper"),
-        (HEAD + ROBOT + "effects = 'auto'\n", "BAD_LINE_FILE", 7, "measured robots alone"),
+        (HEAD + ROBOT + "apply = 'frames'\npartial = true\n", "BAD_LINE_FILE", 8, "leaves targets behind"),
         (HEAD + ROBOT + "effects = 'joint_sero'\n", "BAD_LINE_FILE", 7, "joint_zero"),
         (HEAD + ROBOT + "max_shift = '1,2,3'\n", "BAD_LINE_FILE", 7, "MM,DEG"),
         (HEAD + ROBOT + "profile = []\n", "BAD_LINE_FILE", 7, "profile must be a text"),

@@ -257,6 +257,18 @@ def test_a_full_disk_under_the_ledger_stops_the_line_and_keeps_what_is_done(door
     assert states(migrate(doors, "-o", out)) == {"K": "skipped", "A": "done"}
 
 
+def test_a_folder_with_the_lock_of_a_run_that_ended_at_once(doors, tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / ".lock").touch()
+    assert states(migrate(doors, "-o", tmp_path / "out")) == {"K": "done", "A": "done"}
+
+
+def test_what_was_running_when_its_process_was_killed_is_waiting(doors, tmp_path, monkeypatch):
+    monkeypatch.setattr(Ledger, "finish", lambda self, result, seconds: None)
+    migrate(doors, "-o", tmp_path / "out")
+    assert states(migrate(doors, "--status", "-o", tmp_path / "out")) == {"K": "waiting", "A": "waiting"}
+
+
 def test_the_lock_goes_with_its_holder(tmp_path):
     first, second = Lock(tmp_path), Lock(tmp_path)
     assert first.take()

@@ -127,6 +127,8 @@ def _status(line: LineFile, output: Path) -> Outcome:
         ledger.close()
     if owner is not None and owner[0] != line.name:
         raise BadInputError("ANOTHER_LINE", f"belongs to the line {owner[0]!r} of {owner[1]}", str(output))
+    if free:  # what was at work on them has ended
+        rows = [{**row, "state": "waiting" if row["state"] == "running" else row["state"]} for row in rows]
     return _outcome(line, output, rows, [], None, None if free else str(run or "another process"))
 
 

@@ -21,7 +21,7 @@ from respot.issues import BadInputError
 from respot.line.jobs import Job, JobResult
 from respot.line.schema import APPLICATION, SCHEMA, VERSION
 
-LEDGER = "ledger.sqlite"
+LEDGER, LOCK = "ledger.sqlite", ".lock"
 _BUSY_SECONDS = 10.0
 
 
@@ -284,17 +284,27 @@ class Lock:
     """
 
     def __init__(self, folder: Path) -> None:
-        self._path = folder / ".lock"
+        self._path = folder / LOCK
         self._db: sqlite3.Connection | None = None
 
     def take(self) -> bool:
-        """Take it, unless another process has it."""
-        db = sqlite3.connect(self._path, timeout=0.0, isolation_level=None, check_same_thread=False)
+        """Take it, unless another process has it.
+
+        Raises
+        ------
+        BadInputError
+            ``CANNOT_WRITE``: the folder, or its file system, lets nobody have it.
+        """
+        db = None
         try:
+            db = sqlite3.connect(self._path, timeout=0.0, isolation_level=None, check_same_thread=False)
             db.execute("BEGIN EXCLUSIVE")
-        except sqlite3.OperationalError:
-            db.close()
-            return False
+        except sqlite3.Error as error:
+            if db is not None:
+                db.close()
+            if error.sqlite_errorcode == sqlite3.SQLITE_BUSY:
+                return False
+            raise BadInputError("CANNOT_WRITE", f"cannot be locked: {error}", str(self._path)) from error
         self._db = db
         return True
 

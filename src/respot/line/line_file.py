@@ -22,6 +22,7 @@ from respot.line.settings import (
     OPTIONS,
     OptionError,
     Plain,
+    check_correction,
     check_options,
     check_with_calibration,
     read_option,
@@ -188,8 +189,9 @@ class _Reader:
         try:
             if kind is None:
                 check_with_calibration(own)
+                check_correction(options)
             else:
-                check_options(kind, options)
+                check_options(options)
         except OptionError as error:
             section, place = ("robot", number) if error.key in own else ("defaults", 0)
             raise self._bad(f"robot {name}: {error}", section, place, error.key) from error

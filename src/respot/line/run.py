@@ -13,10 +13,10 @@ from typing import Any
 
 from respot import __version__
 from respot.issues import BadInputError, Issue
-from respot.line.folder import OutputFolder
+from respot.line.folder import WORK, OutputFolder
 from respot.line.inputs import read_inputs
 from respot.line.jobs import Job, JobResult, job_of
-from respot.line.ledger import LEDGER, Known, Ledger, Lock, Run
+from respot.line.ledger import LEDGER, LOCK, Known, Ledger, Lock, Run
 from respot.line.line_file import LineFile
 from respot.line.summary import write_summary
 from respot.line.work import do_job
@@ -165,7 +165,9 @@ def _check_place(path: Path, line: LineFile) -> None:
     """Refuse a folder that holds what no line wrote, or what this one reads."""
     if path.is_symlink() or (path.exists() and not path.is_dir()):
         raise BadInputError("OUTPUT_EXISTS", "is not a folder; name another one with -o", str(path))
-    if path.is_dir() and not (path / LEDGER).exists() and any(path.iterdir()):
+    # a run that was killed in its first moment leaves its lock
+    strange = path.is_dir() and any(item.name not in (LOCK, WORK) for item in path.iterdir())
+    if strange and not (path / LEDGER).exists():
         message = "is not empty and holds no ledger of a line; name another folder with -o"
         raise BadInputError("OUTPUT_EXISTS", message, str(path))
     own = path.resolve()

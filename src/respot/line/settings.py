@@ -89,7 +89,7 @@ def tolerance_of(options: Mapping[str, Plain]) -> float:
     return value
 
 
-def check_options(kind: Literal["theory", "measured"], options: Mapping[str, Plain]) -> None:
+def check_options(options: Mapping[str, Plain]) -> None:
     """Refuse options that make no sense together, before a line starts.
 
     Raises
@@ -103,13 +103,20 @@ def check_options(kind: Literal["theory", "measured"], options: Mapping[str, Pla
     for key in ("tau", "n_min"):
         if key in options and options.get("method") != "paper":
             raise OptionError(key, f'{key} belongs to the paper\'s method: add method = "paper"')
-    effects = _effects(options.get("effects"), kind)
-    if kind == "theory" and (effects == "auto" or "tool_offset" in effects):
-        message = (
-            "effects of a theory: programs are not corrected by a tool offset; leave effects out, or set it for the "
-            "measured robots alone"
-        )
-        raise OptionError("effects", message)
+    check_correction(options)
+
+
+def check_correction(options: Mapping[str, Plain]) -> None:
+    """Refuse options of a correction that make no sense together.
+
+    Raises
+    ------
+    OptionError
+        With the key to change.
+    """
+    if options.get("apply") == "frames" and options.get("partial"):
+        message = "partial leaves targets behind, and a base or tool that changes takes all of them along"
+        raise OptionError("partial", f'apply = "frames": {message}')
 
 
 def check_with_calibration(own: Mapping[str, Plain]) -> None:

@@ -20,6 +20,7 @@ from respot.correction.conversion import Conversion, convert, record_of
 from respot.correction.proof import VerifyError
 from respot.figures.fit_page import fit_page
 from respot.issues import BadInputError, Issue
+from respot.languages.overlay import check_overlay
 from respot.line.findings import effects_of, fit_figures, identity
 from respot.line.jobs import Job, JobResult, inputs_changed
 from respot.line.settings import correction_options, fit_options, tolerance_of
@@ -82,6 +83,8 @@ def _guarded(job: Job, out: Path | None) -> JobResult:
         if isinstance(error.__cause__, MemoryError):
             return _out_of_memory(job, error)
         return JobResult(job.name, "failed", error.issue.code, _words(error.issue))
+    except OSError as error:
+        return JobResult(job.name, "failed", "CANNOT_WRITE", f"its folder cannot be written: {error.strerror}")
     except VerifyError as error:
         return JobResult(job.name, "failed", "VERIFY_FAILED", f"nothing was written: {error}")
     except Exception as error:
@@ -98,6 +101,8 @@ def _out_of_memory(job: Job, error: BaseException) -> JobResult:
 def _work(job: Job, out: Path | None) -> JobResult:
     robot, options = job.robot, job.robot.options
     correction = correction_options(options)
+    if correction.templates is not None:
+        check_overlay(correction.templates)
     reference = None if robot.reference is None else Path(robot.reference)
     calibration = None if robot.calibration is None else Path(robot.calibration)
     fitting = fit_options(robot.kind or "theory", options)
@@ -143,7 +148,7 @@ def _fitted(job: Job, fitted: SourceFit, fitting: FitOptions, out: Path | None) 
     }
     model = precise(fitted.fit)
     if out is not None:
-        out.mkdir(parents=True)
+        out.mkdir()
         _write_fit(job, fitted, model, record, out)
     return JobResult(job.name, "done", figures=figures, effects=effects_of(record, model), outputs=_manifest(out))
 
@@ -162,9 +167,11 @@ def _converted(job: Job, conversion: Conversion, out: Path | None) -> JobResult:
     if record.get("effects_not_written"):
         figures["note"] = f"not written, for a person to put right: {', '.join(record['effects_not_written'])}"
     model = None if conversion.fitted is None else precise(conversion.fitted.fit)
-    if out is None:
-        rehearse(conversion.files, conversion.correction)
-    else:
+    templates = correction_options(job.robot.options).templates
+    if out is None or templates is not None:  # a plant's template is proved before anything is written
+        rehearse(conversion.files, conversion.correction, templates)
+    if out is not None:
+        out.mkdir()
         write_backup(out / PROGRAMS, conversion.files, conversion.correction, record)
         if conversion.fitted is not None and model is not None and fit is not None:
             fit["calibration_hash"] = conversion.calibration.content_hash
