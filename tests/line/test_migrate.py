@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import sqlite3
 import zipfile
@@ -145,6 +146,17 @@ def test_a_robot_that_left_the_line_is_told_and_its_folder_stays(doors, tmp_path
     assert states(record) == {"K": "skipped"}
     assert [issue["code"] for issue in record["issues"]] == ["ROBOT_LEFT_LINE"]
     assert (tmp_path / "out" / "robots" / "A").is_dir()
+
+
+def test_where_nobody_looks_each_robot_is_a_plain_line_with_the_pace(doors, tmp_path):
+    done = CliRunner().invoke(app, ["migrate", str(doors), "-o", str(tmp_path / "out"), "-j", "0"])
+    assert done.exit_code == 0
+    lines = done.stderr.splitlines()
+    for number, name in enumerate("KA"):
+        said = rf"\[{number + 1}/2\] {name} done, 14 spots, 14\.4\d\d -> 5\.1\d\d mm, swapped_ids; "
+        assert re.match(said, lines[number])
+    assert all("robots a minute" in line and "left" in line for line in lines[:2])
+    assert "2 of 2 robots done." in done.stdout
 
 
 def test_a_dry_run_writes_nothing(doors, tmp_path):

@@ -90,6 +90,14 @@ def test_a_result_that_cannot_travel_is_an_error():
         assert pool.submit(math.sqrt, 4.0).result() == 2.0
 
 
+def is_gone(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
+    except (ProcessLookupError, FileNotFoundError):
+        return True
+
+
 @posix
 def test_workers_end_with_their_parent(tmp_path):
     import subprocess
@@ -104,14 +112,11 @@ def test_workers_end_with_their_parent(tmp_path):
     parent.kill()
     parent.wait()
     parent.stdout.close()
-    while True:
-        try:
-            os.kill(worker, 0)
-            if Path(f"/proc/{worker}/stat").read_text().rpartition(")")[2].split()[0] == "Z":
-                break
-        except (ProcessLookupError, FileNotFoundError):
+    for _ in range(6000):  # it has slept for the tenth part of its ten minutes by then
+        if is_gone(worker):
             break
         time.sleep(0.01)
+    assert is_gone(worker)
 
 
 @pytest.mark.parametrize("error", [WorkerLostError(-9), JobTimeoutError(2.5)])

@@ -6,14 +6,16 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from respot.cli.display import Column, heading, line, table
+from respot.cli.display import Column, heading, line, table, table_width, terminal_width
 from respot.figures.line_page import common_text, goes_with_text, headline, size_text
 from respot.figures.words import effect_noun, figure, listing
 
 if TYPE_CHECKING:
     from respot.line.line_file import LineFile
 
-_LEFT, _RIGHT = False, True
+_LEFT = False
+#: Of the last column: it is cut before figures are, to no fewer letters than these; and what stands around it.
+_LEAST_ROOM, _AROUND = 16, 5
 
 
 def show_line(data: Mapping[str, Any], file: LineFile, output: Path | None) -> None:
@@ -68,6 +70,9 @@ def _show_robots(data: Mapping[str, Any]) -> None:
         Column("seconds"),
         Column("effects, notes", _LEFT),
     ]
+    room = max(_LEAST_ROOM, terminal_width() - table_width(columns[:-1], [row[:-1] for row in rows]) - _AROUND)
+    for row in rows:
+        row[-1] = row[-1] if len(row[-1]) <= room else f"{row[-1][: room - 1]}…"
     table(columns, rows, marked)
     for robot in data["robots"]:
         for text in robot["refused"]:
