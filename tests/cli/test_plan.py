@@ -125,6 +125,11 @@ def test_the_order_of_a_list_does_not_matter(corner):
     assert [spot["id"] for spot in told[0]] == [spot["id"] for spot in told[1]]
 
 
+def test_fit_points_to_it_where_causes_are_not_separated(corner):
+    text = ran("fit", corner / "backup", "--measured", corner / "first.csv", "--noise", NOISE)
+    assert "respot plan SOURCE -c CAL.json" in text
+
+
 def test_the_terminal_says_the_same(corner, plan):
     text = ran("plan", corner / "backup", "-c", corner / "cal.json", "--count", COUNT)
     places = [text.index(spot["id"]) for spot in plan["spots"]]

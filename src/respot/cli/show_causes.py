@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 _MOST_PARAMETERS = 9
 _MOST_TRIED = 6
 _SHOWN_ELSEWHERE = ("swapped_ids", "convention", "tool_offset")
+#: Effects that a list or a backup proves: no further spot does.
+_PROVE_THEMSELVES = ("swapped_ids", "convention", "wrong_frame")
 
 
 def show_causes(fit: SpotFit, record: Mapping[str, Any]) -> None:
@@ -90,3 +92,6 @@ def _show_unknown(record: Mapping[str, Any]) -> None:
         line(f"  not asked: {question['text']}")
     for text in record["measure_next"]:
         line(f"  measure next: {text}")
+    causes = [effect for effect in record["effects"] if effect["name"] not in _PROVE_THEMSELVES]
+    if any(effect["not_separated_from"] for effect in causes):
+        line("  which spots of the program that would be: save with -o CAL.json, then respot plan SOURCE -c CAL.json")

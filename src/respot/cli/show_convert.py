@@ -56,6 +56,8 @@ def _show_effects(record: Mapping[str, Any]) -> None:
             f"  {snap['spots']} welds snapped onto their theoretical positions, by up to {snap['largest_mm']:.2f} mm "
             f"({snap['at']}); points within {snap['plateau_mm']:g} mm of a weld along the path keep their way to it"
         )
+        if snap["met_by_several_ways"]:
+            line(f"  {snap['met_by_several_ways']} points that several ways lead to are shifted by the mean of them")
     for each in record.get("left_to_registration", ()):
         line(
             f"  {each['base']}: of its {each['spots']} spots a rigid motion of {each['shift_mm']:.3f} mm and "
