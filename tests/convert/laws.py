@@ -111,7 +111,7 @@ def judge(old: Mapping[str, bytes], new: Mapping[str, bytes], transform: np.ndar
     # an edit in a literal that spans lines is named by its first
     found.wrong += [f"{path}:{line}: claimed and not seen" for path, line in sorted(claimed - changed)]
     found.wrong += [f"{path}:{line}: seen and not claimed" for path, line in sorted(changed - claimed)]
-    _judge_left_behind(before, after, uses, record, found)
+    _judge_left_behind(before, after, uses, transform, record, found)
     return found
 
 
@@ -215,29 +215,47 @@ def _judge_left_behind(
     before: Reading,
     after: Reading,
     uses: Mapping[tuple[str, tuple[int, int]], list[Use]],
+    transform: np.ndarray,
     record: Mapping,
     found: Findings,
 ) -> None:
-    """No target stays under the base of one that moved, where a program goes to both, unless the record says so."""
-    now = {(lit.path, index): lit for path in after.literals.values() for index, lit in enumerate(path)}
-    moved: set[tuple[str, bytes]] = set()
-    stayed: list[tuple[Literal, Use]] = []
-    for path, literals in before.literals.items():
-        for index, literal in enumerate(literals):
-            other = now.get((path, index))
-            same = other is not None and other.texts == literal.texts
-            for use in uses.get((path, literal.span), []):
-                if use.base is not None and not same:
-                    moved.add((use.program, use.base.round(6).tobytes()))
-                elif use.base is not None:
-                    stayed.append((literal, use))
-    told = {(item["program"].lower()) for item in record["refused"]}
-    listed = {item["target"].lower() for item in (*record["unmoved"], *record["refused"])}
-    for literal, use in stayed:
-        program = Path(use.program).stem.lower()
-        expected = (use.program, use.base.round(6).tobytes()) in moved and literal.complete and program not in told
-        if expected and literal.name.lower() not in listed:
-            found.wrong.append(f"{literal.path}:{literal.line} {literal.name}: left behind and not told")
+    """Nothing that a program goes to stays under the base of a target of it that moved, unless it was refused."""
+    changed = {
+        (path, was.span)
+        for path, literals in before.literals.items()
+        for was, now in zip(literals, after.literals.get(path, []), strict=False)
+        if was.texts != now.texts
+    }
+    moved = {_used(use) for place, ways in uses.items() if place in changed for use in ways if use.base is not None}
+    programs = {item["program"].lower() for item in record["refused"]}
+    targets = {item["target"].lower() for item in record["refused"]}
+    for place, ways in uses.items():
+        for use in ways:
+            literal = use.literal
+            told = Path(use.program).stem.lower() in programs or literal.name.lower() in targets
+            if (
+                place not in changed
+                and use.base is not None
+                and _used(use) in moved
+                and not told
+                and _goes(use, transform)
+            ):
+                found.wrong.append(f"{literal.path}:{literal.line} {literal.name}: left behind")
+
+
+def _used(use: Use) -> tuple[str, bool, bytes]:
+    assert use.base is not None
+    return use.program, use.external, use.base.round(6).tobytes()
+
+
+def _goes(use: Use, transform: np.ndarray) -> bool:
+    """Whether a literal must change: its numbers, to the digits that a changed one has at least."""
+    assert use.base is not None
+    seen, literal = in_base(use.base, transform), use.literal
+    if literal.offset:
+        way = literal.values("XYZ" if literal.language == "krl" else "xyz")
+        return bool((np.abs(seen[:3, :3] @ way - way) > 1e-3).any())
+    return literal.complete and bool((np.abs((seen @ literal.pose - literal.pose)[:3, 3]) > 1e-3).any())
 
 
 # ---------------------------------------------------------------------------------------------------------------- back

@@ -15,6 +15,7 @@ from respot.cli import app
 from tests.convert import laws
 from tests.convert.independent import SAMPLES
 from tests.convert.known_transform import transform_about
+from tests.correction.small import krl
 
 
 def save_calibration(path: Path, transform: np.ndarray, ids: tuple[str, ...]) -> None:
@@ -58,9 +59,9 @@ def test_a_simulated_line_there_and_back(robot, tmp_path):
     assert_there_and_back(tmp_path / "line" / "backup", tmp_path)
 
 
-def assert_there_and_back(backup: Path, folder: Path) -> None:
+def assert_there_and_back(backup: Path, folder: Path, least: int = 14) -> None:
     spots = spots_of(backup)
-    assert len(spots) >= 14
+    assert len(spots) >= least
     transform = transform_about(np.mean(list(spots.values()), axis=0))
     calibration, out, back = folder / "cal.json", folder / "out", folder / "back"
     save_calibration(calibration, transform, tuple(spots))
@@ -77,6 +78,22 @@ def assert_there_and_back(backup: Path, folder: Path) -> None:
     assert code in (0, 1), err
     came_back = laws.judge_back(old, laws.files_of(back), record["edits"])
     assert not came_back.wrong
+
+
+def test_numbers_come_back_however_steep_b_is(tmp_path):
+    """By the lock a lost digit of the pose is many of A and C: they are written with more digits there."""
+    rng = np.random.default_rng(7)
+    steep = np.degrees(np.arccos(10.0 ** rng.uniform(-2.0, 0.0, 120))) * rng.choice([-1.0, 1.0], 120)
+    lines, ways = [], []
+    for number, b in enumerate(steep):
+        x, y, z, a, c = (*rng.uniform(-300.0, 300.0, 3), *rng.uniform(-180.0, 180.0, 2))
+        lines.append(f"DECL FRAME XP{number}={{X {x:.3f},Y {y:.3f},Z {z:.3f},A {a:.4f},B {b:.4f},C {c:.4f}}}\n")
+        ways.append(f"LIN XP{number}\n")
+    files = krl("FDAT_ACT=FS1\nBAS(#CP_PARAMS,1)\n" + "".join(ways), "".join(lines))
+    for path, text in files.items():
+        (tmp_path / "in" / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "in" / path).write_bytes(text.replace("\n", "\r\n").encode("ascii"))
+    assert_there_and_back(tmp_path / "in", tmp_path, least=4)
 
 
 # ------------------------------------------------------------------------------------------- small backups with traps
