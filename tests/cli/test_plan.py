@@ -207,6 +207,7 @@ def test_every_spot_is_measured_already(respot, theory):
     assert codes(told.json) == ["FEW_CANDIDATES", "NOTHING_TO_SEPARATE"]
     text = respot("plan", SAMPLES / "kuka", "-c", "cal.json", "--count", 3)
     assert "0 of 0 spots" in text.out
+    assert "shrinks" not in text.out
     assert "measured again" in text.err
 
 

@@ -21,7 +21,8 @@ def show_plan(found: SourcePlan) -> None:
         _spots(plan)
     if plan.pairs:
         _pairs(plan)
-    _surer(plan)
+    if plan.spots:
+        _surer(plan)
     if plan.noise_known is False:
         line(
             "The noise is known from the residuals alone: measure three of the spots three times (a column `repeat`), "

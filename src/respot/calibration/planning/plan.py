@@ -368,8 +368,8 @@ def _issues(calibration: Calibration, plan: Plan, count: int, source: Source) ->
         )
         issues.append(Issue("FEW_CANDIDATES", message, path))
     if calibration.information is None or not calibration.information.rivals:
-        message = f"{_why_nothing(calibration)}; the spots are those that make the model surer where it is least sure"
-        issues.append(Issue("NOTHING_TO_SEPARATE", message))
+        chosen = "; the spots are those that make the model surer where it is least sure" if plan.spots else ""
+        issues.append(Issue("NOTHING_TO_SEPARATE", f"{_why_nothing(calibration)}{chosen}"))
     for each in plan.unasked:
         message = (
             f"{each.effect.label} and {each.rival.label}: {each.lacking} is not known of the spots; --covariates TABLE "
