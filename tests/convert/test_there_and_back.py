@@ -16,6 +16,7 @@ from respot.calibration.effects.term import Parameter, Term
 from respot.cli import app
 from respot.geometry import distance_mm, turn_deg
 from respot.spots import read_source
+from tests.correction.small import SPOTS, krl, moved
 from tests.difference.witness import assert_witnessed
 
 SAMPLES = Path(__file__).parents[2] / "samples" / "rear_door"
@@ -116,3 +117,24 @@ def test_a_calibration_that_was_turned_back_may_be_applied_again_once(tmp_path, 
     once_more = CliRunner().invoke(app, ["convert", str(folder), "-c", str(model), "-o", str(tmp_path / "no")])
     assert once_more.exit_code == 2
     assert "ALREADY_APPLIED" in once_more.stderr
+
+
+def test_programs_that_name_a_calibration_are_its_robots_whatever_their_folder_is_called(tmp_path):
+    """A backup that does not tell the robot's name has that of its folder, and converted it lies in another."""
+    for path, text in krl().items():
+        (tmp_path / "020R01" / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "020R01" / path).write_bytes(text.replace("\n", "\r\n").encode())
+    rows = [f"{name};{x:.4f};{y:.4f};{z:.4f}" for name, (x, y, z) in ((name, moved(SPOTS[name])) for name in SPOTS)]
+    (tmp_path / "theory.csv").write_text("\n".join(["id;x;y;z", *rows]) + "\n")
+    model = tmp_path / "cal.json"
+    respot("fit", tmp_path / "020R01", "--theory", tmp_path / "theory.csv", "-o", model, "--json")
+    respot("convert", tmp_path / "020R01", "-c", model, "-o", tmp_path / "up", "--json")
+    back = respot("convert", tmp_path / "up", "-c", model, "--inverse", "-o", tmp_path / "back", "--json")
+    assert not [issue for issue in back["issues"] if issue["code"] in ("ANOTHER_ROBOT", "ANOTHER_SOURCE")]
+    restored(tmp_path / "020R01", tmp_path / "back")
+    dat = tmp_path / "020R01" / "KRC/R1/Program/weld.dat"
+    dat.write_bytes(dat.read_bytes().replace(b"ENDDAT", b";\r\nENDDAT"))  # not the very files that it was fitted to
+    (tmp_path / "020R01").rename(tmp_path / "020R02")
+    other = CliRunner().invoke(app, ["convert", str(tmp_path / "020R02"), "-c", str(model), "-o", str(tmp_path / "no")])
+    assert other.exit_code == 2
+    assert "ANOTHER_ROBOT" in other.stderr

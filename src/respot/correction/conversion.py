@@ -148,10 +148,9 @@ def convert(
         assert calibration is not None  # noqa: S101 - the command line asks for one of both
         fitted, model = None, load_calibration(calibration)
         read = read_source(source, model.ids, fit_options.spot_id, fit_options.robot_name, fit_options.profiles)
-        issues, ids = (
-            [*read.issues, *source_issues(model, read, any_robot=options.any_source, option="--force")],
-            model.ids,
-        )
+        issues, ids = list(read.issues), model.ids
+        if read.robot is None or not _says(read.robot, mark_of(model, inverse=not options.inverse)):
+            issues += source_issues(model, read, any_robot=options.any_source, option="--force")
     if read.robot is None:
         raise BadInputError("NO_ROBOT", "is a table: only a backup or a program can be converted", str(source))
     _refuse_other_depth(read, model, options)
@@ -163,7 +162,7 @@ def convert(
     if model.kind == "measured" and not options.inverse:
         _refuse_compensated(read, read.robot)
     _refuse_headed(read.robot, mark)
-    if fitted is None and not options.inverse and not _turned_back(read.robot, model):
+    if fitted is None and not options.inverse and not _says(read.robot, mark_of(model, inverse=True)):
         refuse_other_state(model, read, options, str(calibration))
     moves = _moves_of(read, ids)
     if not moves:
@@ -198,9 +197,8 @@ def _applied(source: Source) -> list[str]:
     return [item for item in applied if isinstance(item, str)] if isinstance(applied, list) else []
 
 
-def _turned_back(robot: Robot, model: Calibration) -> bool:
-    """Whether programs say that this very calibration was taken out of them again: they are those of the fit."""
-    mark = mark_of(model, inverse=True)
+def _says(robot: Robot, mark: str) -> bool:
+    """Whether programs say that a calibration was applied to them: they are those of its robot, whatever its name."""
     return any(mark in applied_calibrations(file.source) for file in robot.files.values())
 
 
