@@ -1,28 +1,15 @@
-"""What is said over all robots of a line: which effects return, on which robots, and what a group has in common."""
+"""What is said over all robots of a line: which effects return, and on which robots."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy.stats import fisher_exact
 
-from respot.figures.line_page import common_text, line_page
-from respot.line.fleet import fleet_of, groups_of
+from respot.figures.line_page import line_page
+from respot.line.fleet import fleet_of
 from respot.line.summary import line_record, table
-
-TRAITS = ("group", "station", "gun", "generation", "language", "model")
-
-
-def effect(name="joint_zero", where=None, values=(0.1,), covariance=None, form=None, named=True):
-    parameters = {f"v{row}": {"value": value, "unit": "deg", "ci95": None} for row, value in enumerate(values)}
-    told = {"where": {"axis": 3} if where is None else where, "named": named, "covariance": covariance}
-    return {"name": name, "parameters": parameters, "form": form or {}, **told}
-
-
-def robot(name, *effects, spots=20, **traits):
-    return {"name": name, "spots": spots, "effects": list(effects), **dict.fromkeys(TRAITS, ""), **traits}
+from tests.line.found import effect, robot
 
 
 def test_effects_are_counted_by_kind_and_place():
@@ -69,52 +56,6 @@ def test_by_luck_alone_an_effect_seldom_gathers_anywhere():
         ]
         false += any(row["goes_with"] for row in fleet_of(robots))
     assert false <= 9  # at most 1 in 100 is promised: 3 of 300
-
-
-@given(st.integers(0, 10_000), st.integers(2, 4))
-def test_the_common_values_are_those_of_one_fit_of_all_robots(seed, members):
-    """Stacked least squares, the effect in common and the rest of each robot its own, by numbers drawn at random."""
-    chance = np.random.default_rng(seed)
-    sd, true = 0.1, chance.normal(size=2)
-    robots, rows, results = [], [], []
-    for member in range(members):
-        own, shared = chance.normal(size=(30, 6)), chance.normal(size=(30, 2))
-        seen = own @ chance.normal(size=6) + shared @ true + chance.normal(0.0, sd, 30)
-        alone = np.hstack([own, shared])
-        covariance = sd**2 * np.linalg.inv(alone.T @ alone)
-        values = np.linalg.lstsq(alone, seen, rcond=None)[0][6:]
-        robots.append(robot(f"{member}", effect(values=values, covariance=covariance[6:, 6:].tolist()), group="F1"))
-        block = np.zeros((30, 6 * members + 2))
-        block[:, 6 * member : 6 * member + 6], block[:, -2:] = own, shared
-        rows.append(block)
-        results.append(seen)
-    everything = np.vstack(rows)
-    expected = np.linalg.lstsq(everything, np.concatenate(results), rcond=None)[0][-2:]
-    spread = np.sqrt(np.diag(sd**2 * np.linalg.inv(everything.T @ everything))[-2:])
-    ((common,),) = [group["effects"] for group in groups_of(robots)]
-    for row, name in enumerate(("v0", "v1")):
-        held = common["parameters"][name]
-        assert held["value"] == pytest.approx(expected[row], rel=1e-6, abs=1e-9)
-        assert np.diff(held["ci95"])[0] / 2.0 == pytest.approx(1.959964 * spread[row], rel=1e-6)
-
-
-def test_robots_that_differ_are_said_to_differ():
-    sure = [[1e-4]]
-    alike = [robot("A", effect(values=(0.10,), covariance=sure), group="F"), robot("C", spots=None, group="F")]
-    near, far = (robot("B", effect(values=(value,), covariance=sure), group="F") for value in (0.11, 0.20))
-    ((same,),) = [group["effects"] for group in groups_of([*alike, near])]
-    ((apart,),) = [group["effects"] for group in groups_of([*alike, far])]
-    assert (same["agree"], apart["agree"]) == (True, False)
-    assert common_text(same).startswith("v0 0.105 +- 0.014")
-    assert common_text(apart).startswith("they do NOT agree")
-
-
-def test_values_that_each_robots_own_data_scale_are_no_common_ones():
-    robots = [
-        robot(name, effect(covariance=[[1e-4]], form={"full": full}), group="F")
-        for name, full in (("A", 300), ("B", 590))
-    ]
-    assert groups_of(robots) == [{"group": "F", "robots": ["A", "B"], "effects": []}]
 
 
 def row(name, state="done", **figures):

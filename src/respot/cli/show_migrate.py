@@ -87,7 +87,7 @@ def _show_fleet(data: Mapping[str, Any]) -> None:
     for row in returning:
         size = size_text(row["size"])
         large = f"; {size}" if size else ""
-        line(f"  {row['label']}: {row['count']} of {row['of']} robots, proved on {row['named']}{large}")
+        line(f"  {row['label']}: {row['count']} of {row['of']} robots, named on {row['named']}{large}")
         for item in row["goes_with"]:
             line(f"    gathers on {goes_with_text(item)}")
 

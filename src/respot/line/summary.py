@@ -14,8 +14,9 @@ from typing import Any
 
 from respot import __version__
 from respot.figures.line_page import line_page
-from respot.line.fleet import fleet_of, groups_of, label_of
+from respot.line.fleet import fleet_of, label_of
 from respot.line.folder import ROBOTS, OutputFolder
+from respot.line.groups import groups_of
 from respot.line.jobs import JobResult
 from respot.line.line_file import LineFile, LineRobot
 from respot.line.work import PAGE, PROGRAMS

@@ -187,7 +187,7 @@ def _theory_csv(line: Line, chance: np.random.Generator, *, other: bool) -> str:
 
 
 def _line_file(drawn: Sequence[PlantRobot], noise: float, options: Mapping[str, str]) -> str:
-    lines = ["[line]", 'name = "simulated line"', "", "[defaults]", "tolerance = 5.0"]
+    lines = ["[line]", 'name = "simulated"', "", "[defaults]", "tolerance = 5.0"]
     lines += [f"{key} = {value}" for key, value in options.items()]
     for robot in drawn:
         source = f"backups/{robot.name}{'.zip' if robot.zipped else ''}"
