@@ -310,8 +310,25 @@ def test_what_it_cannot_be_joined_with(tmp_path, options, word):
     refused(convert(tmp_path, krl_line(), *options), "--snap", word)
 
 
-def test_it_needs_the_list_itself(tmp_path):
+@pytest.mark.parametrize("record", ["kept", "lost"])
+def test_it_is_not_turned_back(tmp_path, record):
+    """The robot hands programs back without our record: their headers must tell it too."""
     done = convert(tmp_path, krl_line())
+    backup, saved = tmp_path / "backup", tmp_path / "c.json"
+    run = CliRunner()
+    fit = ["fit", str(backup), "--theory", str(tmp_path / "theory.csv"), "-o", str(saved)]
+    assert run.invoke(app, fit).exit_code == 0
+    if record == "lost":
+        (done.folder / "respot.json").unlink()
+    back = ["convert", str(done.folder), "-c", str(saved), "--inverse", "-o", str(tmp_path / "back"), "--force"]
+    result = run.invoke(app, back)
+    assert result.exit_code == 2
+    assert "snapped" in result.stderr
+    assert not (tmp_path / "back").exists()
+
+
+def test_it_needs_the_list_itself(tmp_path):
+    convert(tmp_path, krl_line())
     listed = tmp_path / "theory.csv"
     backup = tmp_path / "backup"
     run = CliRunner()
@@ -320,11 +337,6 @@ def test_it_needs_the_list_itself(tmp_path):
         result = run.invoke(app, ["convert", str(backup), *reference, "--snap", "-o", str(tmp_path / "no")])
         assert result.exit_code == 2
         assert "--theory" in result.stderr
-    again = ["convert", str(done.folder), "-c", str(tmp_path / "c.json"), "--inverse", "-o", str(tmp_path / "back")]
-    result = run.invoke(app, [*again, "--force"])
-    assert result.exit_code == 2
-    assert "snapped" in result.stderr
-    assert not (tmp_path / "back").exists()
 
 
 # --- the bytes

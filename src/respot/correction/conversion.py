@@ -23,7 +23,7 @@ from respot.correction.snap import SnappedImage
 from respot.issues import BadInputError, Issue
 from respot.languages import LANGUAGES
 from respot.languages.overlay import check_overlay
-from respot.languages.writing import applied_calibrations, says_compensated
+from respot.languages.writing import applied_calibrations, says_compensated, says_snapped
 from respot.program.moves import Move
 from respot.program.robot import Robot
 from respot.spots import Source, read_source
@@ -155,7 +155,7 @@ def convert(
         raise BadInputError("NO_ROBOT", "is a table: only a backup or a program can be converted", str(source))
     _refuse_other_depth(read, model, options)
     if options.inverse:
-        _refuse_snapped(read)
+        _refuse_snapped(read, read.robot)
     image = image_of(model, fitted, read, options, str(calibration or reference))
     mark = mark_of(model, inverse=options.inverse)
     _refuse_recorded(read, _mark(mark, read.robot))
@@ -234,20 +234,22 @@ def _refuse_other_depth(source: Source, calibration: Calibration, options: Corre
         raise BadInputError("BAD_OPTION", f"the tool offset of this calibration was written into the {where}", place)
 
 
-def _refuse_snapped(source: Source) -> None:
+def _refuse_snapped(source: Source, robot: Robot) -> None:
     """Only the rigid part of snapped programs could be turned back: their welds were shifted one by one.
 
     Raises
     ------
     BadInputError
-        ``BAD_OPTION``: the record says that they were snapped.
+        ``BAD_OPTION``: the record, or a file's header, says that they were snapped.
     """
-    if _record(source).get("snap"):
+    place = str(source.path / RECORD) if _record(source).get("snap") else None
+    place = place or next((path for path, file in robot.files.items() if says_snapped(file.source)), None)
+    if place is not None:
         message = (
             "these programs were snapped onto a list: --inverse would turn back their rigid motion and leave what each "
             "weld was shifted by; start from the original backup, or use respot undo after --in-place"
         )
-        raise BadInputError("BAD_OPTION", message, str(source.path / RECORD))
+        raise BadInputError("BAD_OPTION", message, place)
 
 
 def _refuse_compensated(source: Source, robot: Robot) -> None:

@@ -354,7 +354,13 @@ def _changed_files(
         if place is not None:
             earlier = tuple(sorted(still_applied(applied_calibrations(file.source), header.calibration_hash)))
             said = Header(
-                __version__, header.direction, header.kind, file.source.sha256, header.calibration_hash, earlier
+                version=__version__,
+                direction=header.direction,
+                kind=header.kind,
+                source_sha256=file.source.sha256,
+                calibration_sha256=header.calibration_hash,
+                earlier=earlier,
+                snapped=options.snap,
             )
             changes = [*changes, Edit(place, made.header(said, file.source.newline), "header")]
         files[path] = file.source.encode(splice(file.source.text, changes))

@@ -64,6 +64,8 @@ class Header:
         Hash of the file before the change and of the calibration.
     earlier : tuple of str
         Hashes of calibrations that were applied to the file before.
+    snapped : bool
+        Welds were shifted one by one: the change is no rigid motion, and none turns it back.
     """
 
     version: str
@@ -72,6 +74,7 @@ class Header:
     source_sha256: str
     calibration_sha256: str
     earlier: tuple[str, ...] = ()
+    snapped: bool = False
 
 
 class Templates:
@@ -178,6 +181,7 @@ def templates(language: str, overlay: Path | None = None) -> Templates:
 #: A line of a header of ours, whatever the comment mark: ``;respot: ..``, ``  !respot: ..``
 _HEADER_LINE = re.compile(r"[ \t]*[;!]respot: [^\r\n]*(?:\r*\n|\r|$)")
 _COMPENSATED = re.compile(r"[;!]respot: \S+ compensate measured\b")
+_SNAPPED = re.compile(r"[;!]respot: \S+ \S+ \S+ snapped\b")
 _APPLIED = re.compile(r"[;!]respot: (?:earlier )?calibration sha256 ([0-9a-f]{64})")
 
 
@@ -201,6 +205,11 @@ def applied_calibrations(source: SourceText) -> set[str]:
 def says_compensated(source: SourceText) -> bool:
     """Whether the file's header says that its points were compensated by a measurement, and not turned back since."""
     return _COMPENSATED.search(source.text) is not None
+
+
+def says_snapped(source: SourceText) -> bool:
+    """Whether the file's header says that its welds were shifted one by one."""
+    return _SNAPPED.search(source.text) is not None
 
 
 def finest(numbers: Iterable[Number], least: int) -> int:
