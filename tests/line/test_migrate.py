@@ -138,6 +138,26 @@ def test_a_robot_that_fails_now_leaves_no_old_programs_behind(doors, tmp_path):
     assert not list((tmp_path / "out" / "robots").iterdir())
 
 
+def test_a_robot_with_a_calibration_is_converted_without_a_fit(doors, tmp_path, monkeypatch):
+    monkeypatch.chdir(doors.parent)
+    fitted = CliRunner().invoke(app, ["fit", "kuka", "--theory", "theory.csv", "-o", "cal.json", "--effects", "none"])
+    assert fitted.exit_code == 0, fitted.stderr
+    doors.write_text(doors.read_text().replace('source = "kuka"', 'source = "kuka"\ncalibration = "cal.json"'))
+    robot, _ = migrate(doors, "-o", tmp_path / "out")["robots"]
+    assert (robot["state"], robot["spots"], robot["page"]) == ("done", None, None)
+    assert robot["edits"] > 10
+    assert not (tmp_path / "out" / "robots" / "K" / "fit.html").exists()
+
+
+def test_options_of_a_robot_are_obeyed(doors, tmp_path):
+    text = doors.read_text().replace('source = "kuka"', 'source = "kuka"\nmax-shift = 2.0')
+    doors.write_text(text.replace('source = "abb"', 'source = "abb"\nholdout = 0.2\nseed = 4'))
+    first, second = migrate(doors, "-o", tmp_path / "out", code=1)["robots"]
+    assert first["refused"] == ["rear_door_o: SHIFT_TOO_LARGE", "rear_door_u: SHIFT_TOO_LARGE"]
+    assert (first["state"], first["edits"]) == ("done", 0)
+    assert second["spots"] == 11
+
+
 def test_a_robot_that_left_the_line_is_told_and_its_folder_stays(doors, tmp_path):
     migrate(doors, "-o", tmp_path / "out")
     text = doors.read_text()

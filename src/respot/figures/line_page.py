@@ -48,7 +48,8 @@ def headline(totals: Mapping[str, Any]) -> str:
     if totals["failed"]:
         parts.append(f"{totals['failed']} failed")
     if totals["refused"]:
-        parts.append(f"{count(totals['refused'], 'program')} refused and left as it was")
+        left = "as it was" if totals["refused"] == 1 else "as they were"
+        parts.append(f"{count(totals['refused'], 'program')} refused and left {left}")
     open_ones = totals["waiting"] + totals["running"]
     if open_ones:
         parts.append(f"{open_ones} still to do")
