@@ -22,6 +22,7 @@ from pathlib import Path
 
 import shutil  # isort: skip
 
+import respot.output.disk
 import respot.output.in_place
 import respot.output.new_folder
 import respot.output.undo
@@ -39,6 +40,7 @@ STEPS = (
     (os, "utime"),
     (Path, "write_bytes"),
     (shutil, "copymode"),
+    (respot.output.disk, "sync_disk"),
     (respot.output.workplace, "exchange"),
     (respot.output.new_folder, "prove"),
     (respot.output.in_place, "prove"),
@@ -163,6 +165,8 @@ def _prepare(request: dict, said: dict) -> None:
             raise PermissionError(1, "Operation not permitted")
 
         os.link = refuse
+    if request.get("no_sync_disk"):  # as on a system that waits for files one by one
+        respot.output.disk.sync_disk = lambda folder: False
     for mount in request.get("mounts", ()):
         said["mounted"] = _mount(mount)
     if request.get("largest_file"):

@@ -254,16 +254,19 @@ def test_two_runs_at_once_on_one_folder(respot: Runner, tmp_path, backup, cal):
 
 def test_what_is_proved_was_waited_for_and_moves_with_its_record(respot: Runner, tmp_path, backup, cal):
     """Everything is on the disk before it is proved, and in its place by the one rename that comes after."""
+    files = len([path for path in backup.rglob("*") if path.is_file()])
     for target, rename in ((["-o", tmp_path / "out"], "rename"), (["--in-place"], "exchange")):
-        ended = respot("convert", backup, "-c", cal, *target)
-        assert ended.code == 0
-        proved, moved = ended.steps.index("prove"), ended.steps.index(rename)
-        files = len([path for path in backup.rglob("*") if path.is_file()])
-        assert ended.steps[:proved].count("fsync") > files
-        assert "fsync" not in ended.steps[proved:moved]
-        assert not {"write_bytes", "link", "mkdir"} & set(ended.steps[proved:])
-        assert {"rename", "exchange"} & set(ended.steps) == {rename} and ended.steps.count(rename) == 1
-        assert ended.steps[moved + 1] == "fsync"
+        for how in ({}, {"no_sync_disk": True}):
+            ended = respot("convert", backup, "-c", cal, *target, **how)
+            assert ended.code == 0, ended.err
+            proved, moved = ended.steps.index("prove"), ended.steps.index(rename)
+            waited = "fsync" if how else "sync_disk"
+            assert ended.steps[:proved].count(waited) > (files if how else 0)
+            assert not {"write_bytes", "link", "mkdir", "sync_disk", "fsync"} & set(ended.steps[proved:moved])
+            assert not {"write_bytes", "link"} & set(ended.steps[ended.steps[:proved].index(waited) : proved])
+            assert {"rename", "exchange"} & set(ended.steps) == {rename} and ended.steps.count(rename) == 1
+            assert ended.steps[moved + 1] == "fsync"
+            assert respot("undo", backup if target == ["--in-place"] else target[1]).code == 0
 
 
 @pytest.mark.parametrize("command", ["fit", "diff", "predict", "predict_xlsx"])

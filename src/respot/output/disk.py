@@ -90,10 +90,35 @@ def replacing(path: Path) -> Iterator[Path]:
 
 def flush(folder: Path) -> None:
     """Wait until all files and folders below a folder are on the disk: no power cut leaves an empty file."""
+    if sync_disk(folder):
+        return
     for here, _, names in os.walk(folder, topdown=False):
         for name in names:
             _sync(Path(here, name), os.O_RDWR if sys.platform == "win32" else os.O_RDONLY)
         sync_folder(Path(here))
+
+
+def sync_disk(folder: Path) -> bool:
+    """Wait once for the whole disk of a folder, which thousands of files reach sooner than one by one.
+
+    Returns
+    -------
+    bool
+        Whether it was done; False where the system has no such call.
+    """
+    wait = getattr(ctypes.CDLL(None, use_errno=True), "syncfs", None) if sys.platform == "linux" else None
+    if wait is None:
+        return False
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        if wait(handle) == 0:
+            return True
+    finally:
+        os.close(handle)
+    number = ctypes.get_errno()
+    if number == errno.ENOSYS:
+        return False
+    raise OSError(number, os.strerror(number), str(folder))
 
 
 def sync_folder(folder: Path) -> None:
