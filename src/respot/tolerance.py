@@ -103,7 +103,7 @@ class NumberStyle:
 
     def at_least(self, decimals: int) -> NumberStyle:
         """Style for a changed number: the source's decimals, but never fewer than asked for and without exponent."""
-        if self.base:
+        if self.base and decimals <= 0:
             return self
         own = self.decimals - int(self.exponent[1:] or 0) if self.exponent else self.decimals
         count = min(max(own, decimals), max(MOST_DECIMALS, decimals))

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 from scipy.spatial.transform import RigidTransform
 
 from respot.geometry import IDENTITY
 from respot.program.targets import Number
 from respot.source import Span
+
+#: What a motion uses a frame as.
+Role = Literal["base", "tool"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +82,32 @@ class Frame:
 
     def __str__(self) -> str:
         return f"{self.name} {self.label}".rstrip()
+
+
+@dataclass(frozen=True, slots=True)
+class FrameReading:
+    """Code that takes the value of a tool or base, other than to move under it.
+
+    Parameters
+    ----------
+    frame : Frame or None
+        What it reads; None where it may be any: what is in force there, or one whose number or name is computed.
+    role : str
+        ``base`` or ``tool``.
+    what : str
+        What it does, for messages.
+    path, line :
+        Where.
+    """
+
+    frame: Frame | None
+    role: Role
+    what: str
+    path: str
+    line: int
+
+    def __str__(self) -> str:
+        return f"{self.what} ({self.path}:{self.line})"
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from functools import cached_property
 
 from respot.issues import Issue
 from respot.program.forms import Form
-from respot.program.frames import Frame
+from respot.program.frames import Frame, FrameReading
 from respot.program.moves import Move
 from respot.program.statement import Statement
 from respot.program.targets import Target
@@ -164,6 +164,8 @@ class Robot:
         Finds its inline forms, of which not every job asks.
     writes : callable
         ``writes(path, name)``: whether code may give a datum declared in a file another value while the robot runs.
+    find_readings : callable
+        Finds where its code reads tools and bases, of which not every job asks.
     """
 
     name: str
@@ -179,11 +181,17 @@ class Robot:
     task: str = ""
     find_forms: Callable[[], Sequence[Form]] = tuple
     writes: Callable[[str, str], bool] = _never
+    find_readings: Callable[[], Sequence[FrameReading]] = tuple
 
     @cached_property
     def forms(self) -> Sequence[Form]:
         """Its inline forms, with all copies of their fields."""
         return self.find_forms()
+
+    @cached_property
+    def readings(self) -> Sequence[FrameReading]:
+        """Where its code takes the value of a tool or base, other than to move under it."""
+        return self.find_readings()
 
     @property
     def programs(self) -> list[str]:

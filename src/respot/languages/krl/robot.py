@@ -13,6 +13,7 @@ from respot.languages.krl.binding import Binder
 from respot.languages.krl.controller import read_facts
 from respot.languages.krl.forms import FORMS, Data, read_forms
 from respot.languages.krl.frames import Frames
+from respot.languages.krl.readings import frame_readings
 from respot.languages.krl.recognition import recognise
 from respot.languages.krl.run_time import RunTime, read_run_time
 from respot.languages.krl.symbols import Scope, Symbols, is_own, module_key, read_definitions, read_symbols
@@ -52,6 +53,7 @@ def read_robots(name: str, root: str, files: Mapping[str, bytes], forms: Forms =
                 read[path] = _read_file(path, data)
             else:
                 issues.append(Issue("NOT_A_PROGRAM", "is no KRL module; it is copied as it is", path))
+    unread = {path: data for path, data in files.items() if path in live and path not in read}
     for path, file in read.items():
         issues += opaque_issues(file)
         issues += blocks.block_issues(path, file.statements)
@@ -82,6 +84,7 @@ def read_robots(name: str, root: str, files: Mapping[str, bytes], forms: Forms =
         issues=issues,
         find_forms=lambda: _forms(read, code, symbols, forms),
         writes=lambda path, name: _is_written(symbols, run_time, path, name),
+        find_readings=lambda: tuple(frame_readings(read, unread, frames)),
     )
     return [robot]
 

@@ -7,6 +7,7 @@ does with the target, tool and work object that it is handed is read from its ow
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 from respot.issues import Issue
@@ -16,13 +17,14 @@ from respot.languages.rapid.displacement import Displacements
 from respot.languages.rapid.drafts import Draft, Finisher
 from respot.languages.rapid.frames import Frames, FrameUse
 from respot.languages.rapid.operands import Operands
+from respot.languages.rapid.readings import TaskReadings
 from respot.languages.rapid.run_time import RunTime
 from respot.languages.rapid.symbols import Module, Symbol, Task
 from respot.languages.rapid.targets import Targets
 from respot.languages.rapid.walk import Context, Summary, Walk
-from respot.program.frames import Frame
+from respot.program.frames import Frame, FrameReading
 from respot.program.moves import Move
-from respot.program.robot import Call, Routine
+from respot.program.robot import Call, ProgramFile, Routine
 
 #: Wrappers within wrappers are followed so deep.
 _DEEPEST = 40
@@ -69,6 +71,12 @@ class Binder:
     def frame(self, symbol: Symbol, module: Module) -> Frame | None:
         """Tool or work object of a datum; one `Frame` for each datum."""
         return self._frames.of(symbol, module).frame
+
+    def readings(
+        self, files: Mapping[str, ProgramFile], unread: Mapping[str, bytes], loadable: Mapping[str, bytes]
+    ) -> list[FrameReading]:
+        """Where code reads tools and work objects; as `TaskReadings.find`, once all routines are bound."""
+        return TaskReadings(self._task, self._frames, files).find(unread, loadable)
 
     def routine(self, block: Block, module: Module) -> Routine:
         """Motions and calls of a routine; what is not known of them goes to `issues`."""

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from respot.languages.rapid import machine
 from respot.languages.rapid.references import Datum, resolve, whole
 from respot.languages.rapid.run_time import RunTime
 from respot.languages.rapid.symbols import Module, Symbol, Task, Value, value_of
-from respot.program.frames import Frame, Load
+from respot.languages.rapid.targets import Keys
+from respot.program.frames import Frame, Load, Role
 from respot.program.statement import Node
 
 _READERS: dict[str, Callable[[str, Value | None, str, int], Frame]] = {
@@ -17,6 +18,7 @@ _READERS: dict[str, Callable[[str, Value | None, str, int], Frame]] = {
     "wobjdata": machine.read_work_object,
 }
 _WHAT = {"tooldata": "tool", "wobjdata": "work object"}
+_ROLES: Mapping[str, Role] = {"tooldata": "tool", "wobjdata": "base"}
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,22 @@ class Frames:
     def __init__(self, task: Task, run_time: RunTime) -> None:
         self._task = task
         self._run_time = run_time
-        self._uses: dict[object, FrameUse] = {}
+        self._undeclared: dict[str, FrameUse] = {}
+        self._declared: dict[tuple[tuple[str, int, str], Keys], tuple[FrameUse, Role]] = {}
+        #: offsets, by file, at which a motion names a known frame as its own, or a parameter of its routine that is one
+        self.used: dict[str, set[int]] = {}
+
+    def all(self) -> Iterator[tuple[Frame, Role]]:
+        """Yield the known frames and what motions use them as."""
+        for use, role in self._declared.values():
+            if use.frame is not None:
+                yield use.frame, role
+
+    def of_symbol(self, symbol: Symbol) -> Iterator[tuple[Keys, Frame, Role]]:
+        """Yield the known frames within a datum, with where they stand in it."""
+        for (key, keys), (use, role) in self._declared.items():
+            if key == symbol.key and use.frame is not None:
+                yield keys, use.frame, role
 
     def of(self, symbol: Symbol, module: Module) -> FrameUse:
         """Tool or work object of a datum."""
@@ -87,14 +104,15 @@ class Frames:
             world = {"tool0": FLANGE, "wobj0": WORLD}.get(node.text.lower())
             if world is not None and (kind == "tooldata") == (world is FLANGE):
                 return world
-            key = ("nowhere", node.text.lower())
-            if key not in self._uses:
-                self._uses[key] = FrameUse(_unknown(node.text, "not declared in this backup"))
-            return self._uses[key]
+            key = node.text.lower()
+            if key not in self._undeclared:
+                self._undeclared[key] = FrameUse(_unknown(node.text, "not declared in this backup"))
+            return self._undeclared[key]
         if datum.unknown:
             return FrameUse(_unknown(node.text, datum.unknown))
         if datum.type != kind:
             return FrameUse(_unknown(node.text, f"has the type {datum.type}, not {kind}"))
+        self.used.setdefault(module.path, set()).add(node.span[0])
         return self._use(datum, node.text, module)
 
     def load(self, node: Node, module: Module, local: Mapping[str, Symbol]) -> Load:
@@ -115,9 +133,9 @@ class Frames:
                 return FrameUse(None, parameter=symbol.name.lower())
             return FrameUse(_unknown(name, "is part of a parameter of the routine"))
         key = (symbol.key, datum.keys)
-        if key not in self._uses:
-            self._uses[key] = self._read(datum, name, module)
-        return self._uses[key]
+        if key not in self._declared:
+            self._declared[key] = (self._read(datum, name, module), _ROLES[datum.type])
+        return self._declared[key][0]
 
     def _read(self, datum: Datum, name: str, module: Module) -> FrameUse:
         symbol = datum.symbol

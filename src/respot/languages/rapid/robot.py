@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import PurePosixPath
 
 from respot.issues import Issue
@@ -20,7 +21,7 @@ from respot.languages.rapid.syntax import ENCODINGS, read_statements
 from respot.languages.rapid.targets import Targets
 from respot.languages.rapid.tasks import missing_modules, share_tasks
 from respot.languages.reading import opaque_issues
-from respot.program.frames import Frame
+from respot.program.frames import Frame, FrameReading
 from respot.program.robot import ProgramFile, Robot, Routine
 from respot.program.targets import Target
 from respot.source import SourceText
@@ -85,6 +86,7 @@ def read_robots(name: str, root: str, files: Mapping[str, bytes], forms: Forms =
                 issues=[*own, *share.issues, *(issue for part in parts for issue in part.issues)],
                 task=share.name if len(shares) > 1 else "",
                 writes=writes,
+                find_readings=partial(_readings, root, parts, share.folders, files, read),
             )
         )
     return robots
@@ -111,6 +113,24 @@ class _Bound:
     tools: list[Frame]
     bases: list[Frame]
     issues: list[Issue]
+    #: of module files of the task that cannot be read, and of others that code may load
+    readings: Callable[[Mapping[str, bytes], Mapping[str, bytes]], list[FrameReading]]
+
+
+def _readings(
+    root: str,
+    parts: Sequence[_Bound],
+    folders: Sequence[str],
+    files: Mapping[str, bytes],
+    read: Mapping[str, ProgramFile],
+) -> Sequence[FrameReading]:
+    """Where the tasks of a robot read tools and work objects."""
+    live = live_programs("rapid", SUFFIXES, root, files)
+    others = {path: data for path, data in files.items() if path not in read and path.lower().endswith(SUFFIXES)}
+    others = {path: data for path, data in others.items() if recognise(data) != "binary"}
+    unread = {path: data for path, data in others.items() if path in live and _task(root, path) in folders}
+    loadable = {path: data for path, data in others.items() if path not in live}
+    return [reading for part in parts for reading in part.readings(unread, loadable)]
 
 
 def _bind(
@@ -127,7 +147,7 @@ def _bind(
                 if frame is not None:
                     (tools if symbol.type == "tooldata" else bases).append(frame)
     routines = [binder.routine(block, module) for module in modules for block in module.routines.values()]
-    return _Bound(routines, list(targets), tools, bases, binder.issues)
+    return _Bound(routines, list(targets), tools, bases, binder.issues, partial(binder.readings, files))
 
 
 def _read_modules(
