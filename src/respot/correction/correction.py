@@ -152,7 +152,9 @@ def correct(
     unseen = image.see(scope, changeable)
     depth = Depth() if changeable is None else depth_of(scope, image, changeable)
     after = {id(moving): image.pose(moving) for moving in scope.moving}
-    moving = [item for item in scope.moving if _moves(item, after[id(item)])]
+    written = {id(item): depth.target(item, after[id(item)]) for item in scope.moving}
+    # where a tool changes and the base that was taught with it stays, numbers change though nothing moves
+    moving = [item for item in scope.moving if _moves(item, after[id(item)]) or _moves(item, written[id(item)])]
     refused = [*scope.refusals, *unseen, *_too_far(moving, after, options.furthest(kind))]
     cell = cell_of(robot.machine, robot.language, options.robot)
     printed = {id(item): _printed(robot, language, item, after[id(item)]) for item in moving}
@@ -160,7 +162,8 @@ def correct(
     flight = Preflight(cell, robot, language, scope, {id(i.target): printed[id(i)] for i in moving}, image.offset)
     together = [*(item.programs for item in scope.moving), *(change.programs for change in depth.changes.values())]
     checked, kept, refused_programs = _preflight(flight, together, moving, options, refused)
-    edits = _edits(robot, language, options, kept, moving, after, configured, scope, image, depth)
+    edits = _edits(robot, language, options, kept, moving, after, written, configured, scope, image, depth)
+    moved = {id(item.target) for item in moving if not kept.holds(item) and _moves(item, after[id(item)])}
     header = _Header(image.direction, kind, calibration_hash)
     return Correction(
         robot=robot,
@@ -172,7 +175,7 @@ def correct(
         refused=refused,
         refused_programs=refused_programs,
         depth=depth,
-        transitions=_transitions(robot, scope, {id(i.target) for i in moving if not kept.holds(i)}, refused_programs),
+        transitions=_transitions(robot, scope, moved, refused_programs),
         offsets={id(move): image.offset(move) for move in _turning(scope, kept)},
         goals={id(item.target): after[id(item)] for item in moving if not kept.holds(item)},
         files=_changed_files(robot, language, options, edits, header),
@@ -304,6 +307,7 @@ def _edits(
     kept: _Kept,
     moving: Sequence[Moving],
     after: Mapping[int, RigidTransform],
+    written: Mapping[int, RigidTransform],
     configured: Mapping[int, Mapping[str, float]],
     scope: Scope,
     image: Image,
@@ -314,8 +318,7 @@ def _edits(
     for item in moving:
         if not kept.holds(item):
             text = robot.files[item.target.path].source.text
-            written = depth.target(item, after[id(item)])
-            edits.append(point_edit(item, written, configured.get(id(item), {}), text, language, made))
+            edits.append(point_edit(item, written[id(item)], configured.get(id(item), {}), text, language, made))
     # one offset that a call hands to a routine with several motions is one literal
     offsets = {(move.offset.path, move.offset.span): move for move in _turning(scope, kept) if move.offset is not None}
     edits += [

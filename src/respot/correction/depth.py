@@ -16,14 +16,14 @@ from typing import Protocol
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
-from respot.correction.changeable import Changeable, Role, roles
+from respot.correction.changeable import Changeable, roles
 from respot.correction.points import PointEdit, in_base, moves_at_all
 from respot.correction.scope import Moving, Scope
 from respot.geometry import Array, distance_mm, turn_deg
 from respot.issues import Issue
 from respot.languages import Language
 from respot.languages.writing import Templates, changes_of
-from respot.program.frames import Frame, PoseLiteral
+from respot.program.frames import Frame, PoseLiteral, Role
 from respot.program.moves import Move
 from respot.program.robot import Robot
 from respot.program.targets import Target, TargetKind
@@ -147,7 +147,7 @@ def _after(frame: Frame, users: Sequence[Moving], causes: Causes) -> RigidTransf
     if frame.pose is None:
         return None
     after = frame.pose
-    carrying = next((item for item in users if item.moves[0].workpiece is frame), None)
+    carrying = next((item for item in users if any(move.workpiece is frame for move in item.moves)), None)
     if carrying is not None:
         deviation = causes.deviation(carrying.base2spots)
         after = after if deviation is None else after * in_base(carrying.base2spots, deviation)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import fnmatch
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from scipy.spatial.transform import RigidTransform
@@ -133,7 +133,7 @@ class _Finder:
             if move.target is not None:
                 self._everywhere.setdefault(id(move.target), []).append(move)
         self._found: dict[tuple[str, int, bool], bool] = {}
-        self._points = {t.name.lower() for t in robot.targets if t.kind is not TargetKind.JOINTS}
+        self._positions = positions_of(robot)
         self._frame_names = _frame_names(self._everywhere.values())
 
     def find(self) -> Scope:
@@ -157,7 +157,7 @@ class _Finder:
         uses: dict[int, list[Move]] = {}
         for routine in scope.routines:
             for unread in routine.unread:
-                if id(routine) not in self._core and not self._may_move(unread):
+                if id(routine) not in self._core and not may_go(unread, self._positions):
                     continue
                 message = f"nobody knows what {unread.text.strip()!r} does: {unread.reason}"
                 name = f"line {unread.line}"
@@ -173,11 +173,6 @@ class _Finder:
                     if move.offset is not None:
                         scope.offsets.append(move)
         return scope, uses
-
-    def _may_move(self, unread: Unread) -> bool:
-        """Whether a statement that no rule knows names a position: it may go there."""
-        names = {name.lower() for name in _NAME.findall(unread.text)}
-        return bool(names & self._points) or bool(_POSE.search(unread.text))
 
     def _is_service(self, routine: Routine) -> bool:
         return id(routine) not in self._welding and routine.service
@@ -290,6 +285,17 @@ class _Finder:
     def _is_frame(self, target: Target) -> bool:
         """Whether code takes a target for a base or tool, or makes one of it."""
         return bool({target.path, ""} & self._frame_names.get(target.name.lower(), set()))
+
+
+def positions_of(robot: Robot) -> set[str]:
+    """Names of a robot's positions other than joints, in lower case."""
+    return {target.name.lower() for target in robot.targets if target.kind is not TargetKind.JOINTS}
+
+
+def may_go(unread: Unread, positions: Collection[str]) -> bool:
+    """Whether a statement that no rule knows names a position, or holds one: it may go there."""
+    names = {name.lower() for name in _NAME.findall(unread.text)}
+    return not names.isdisjoint(positions) or bool(_POSE.search(unread.text))
 
 
 def _frame_names(moves: Iterable[Sequence[Move]]) -> dict[str, set[str]]:
