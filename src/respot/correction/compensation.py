@@ -32,7 +32,7 @@ from respot.correction.scope import Moving, Refusal, Scope
 from respot.correction.seats import Seated, Seating
 from respot.correction.written import Split
 from respot.geometry import IDENTITY, Array, distance_mm, turn_deg
-from respot.issues import Issue
+from respot.issues import BadInputError, Issue
 from respot.kinematics.cell import Reason, RobotCell
 from respot.languages import Language
 from respot.program.frames import Frame
@@ -83,11 +83,14 @@ class Choice:
         ``kept`` or ``remeasured``: whether a rigid motion of all points under a base is left out of them.
     max_residual : float
         No target departs from the rigid motion of its path by more [mm].
+    in_tool : bool or None
+        On the way back, whether the tool offset stands in the tool's data; None where nothing says.
     """
 
     inverse: bool
     bases: Bases
     max_residual: float
+    in_tool: bool | None = None
 
 
 class Compensation:
@@ -200,7 +203,13 @@ class Compensation:
     def _see_tools(
         self, goals: Sequence[Goal], offsets: Sequence[Goal], scope: Scope, changeable: Changeable | None
     ) -> None:
-        """Decide whether the fitted offset goes into the data of the tool, all of them or none, and say so."""
+        """Decide whether the fitted offset goes into the data of the tool, all of them or none, and say so.
+
+        Raises
+        ------
+        BadInputError
+            ``BAD_OPTION``: it stands in the data of a tool that must stay as it is now.
+        """
         offset = self._split.errors.tool_offset
         if offset is None:
             return
@@ -210,8 +219,13 @@ class Compensation:
         if changeable is not None:
             reason = next(filter(None, (changeable.objection(tool, "tool") for tool in tools.values())), "")
             reason = reason or _with_others(scope, tools)
+            tool = next(iter(tools.values()))
+            if reason and self._choice.in_tool:
+                message = f"the tool offset of this calibration stands in {tool} and cannot be taken out: {reason}"
+                raise BadInputError("BAD_OPTION", message, tool.path, tool.line)
+            if self._choice.in_tool is False:
+                reason = "there it was written before"
             if reason:
-                tool = next(iter(tools.values()))
                 message = f"{tool} stays as it is, and its error goes into the points: {reason}"
                 self.issues.append(Issue("FRAME_KEPT", message, tool.path, tool.line))
             else:

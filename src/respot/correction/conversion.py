@@ -20,6 +20,7 @@ from respot.correction.images import image_of, refuse_other_state
 from respot.correction.marks import mark_of, still_applied
 from respot.correction.options import CorrectionOptions
 from respot.correction.snap import SnappedImage
+from respot.correction.written import tool_offset_of
 from respot.issues import BadInputError, Issue
 from respot.languages import LANGUAGES
 from respot.languages.overlay import check_overlay
@@ -153,10 +154,10 @@ def convert(
             issues += source_issues(model, read, any_robot=options.any_source, option="--force")
     if read.robot is None:
         raise BadInputError("NO_ROBOT", "is a table: only a backup or a program can be converted", str(source))
-    _refuse_other_depth(read, model, options)
+    in_tool = _offset_in_tool(read, model, options)
     if options.inverse:
         _refuse_snapped(read, read.robot)
-    image = image_of(model, fitted, read, options, str(calibration or reference))
+    image = image_of(model, fitted, read, options, str(calibration or reference), in_tool)
     mark = mark_of(model, inverse=options.inverse)
     _refuse_recorded(read, _mark(mark, read.robot))
     if model.kind == "measured" and not options.inverse:
@@ -209,29 +210,35 @@ def _refuse_headed(robot: Robot, mark: str) -> None:
             raise BadInputError("ALREADY_APPLIED", message, path)
 
 
-def _refuse_other_depth(source: Source, calibration: Calibration, options: CorrectionOptions) -> None:
-    """A tool offset is taken out again from where it was written.
+def _offset_in_tool(source: Source, calibration: Calibration, options: CorrectionOptions) -> bool | None:
+    """Whether a tool offset that is taken out again stands in the tool's data; None of one that is put in.
 
     Raises
     ------
     BadInputError
         ``BAD_OPTION``: the record says that it stands elsewhere than ``--apply`` says, or nothing says where.
     """
-    if not options.inverse or calibration.tool_offset is None:
-        return
+    if tool_offset_of(calibration) is None:
+        return None
     last, place = _record(source), str(source.path / RECORD)
     made = last.get("calibration")
     known = isinstance(made, dict) and made.get("hash") == calibration.content_hash
+    if not options.inverse and last.get("direction") == ("align" if calibration.kind == "theory" else "compensate"):
+        return None  # it is no way back, but twice the same
     edits = last.get("edits") if known else None
+    frames = options.apply == "frames"
     if not isinstance(edits, list):
-        if options.apply == "frames" and calibration.kind == "measured":
+        if frames and options.inverse and calibration.kind == "measured":
             message = "nothing says that the tool data hold the offset of this calibration: no record of it is found"
             raise BadInputError("BAD_OPTION", f"--apply frames: {message}", place)
-        return
-    in_tool = any(isinstance(edit, dict) and edit.get("depth") == "tool" for edit in edits)
-    if in_tool != (options.apply == "frames"):
-        where = "tool data: add --apply frames" if in_tool else "points: leave --apply frames out"
-        raise BadInputError("BAD_OPTION", f"the tool offset of this calibration was written into the {where}", place)
+        return None
+    depths = {edit.get("depth") for edit in edits if isinstance(edit, dict)}
+    written = "the tool offset of this calibration was written into the"
+    if "tool" in depths and not frames:
+        raise BadInputError("BAD_OPTION", f"{written} tool data: add --apply frames", place)
+    if frames and depths.isdisjoint(("tool", "base")):
+        raise BadInputError("BAD_OPTION", f"{written} points: leave --apply frames out", place)
+    return "tool" in depths
 
 
 def _refuse_snapped(source: Source, robot: Robot) -> None:

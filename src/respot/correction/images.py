@@ -14,7 +14,7 @@ from respot.correction.compensation import Cell, Choice, Compensation
 from respot.correction.image import Image, RigidImage
 from respot.correction.options import CorrectionOptions
 from respot.correction.snap import snapped
-from respot.correction.written import Split, split
+from respot.correction.written import Split, split, tool_offset_of
 from respot.issues import BadInputError
 from respot.kinematics.cell import Reason, RobotCell
 from respot.kinematics.from_backup import cell_of
@@ -25,7 +25,12 @@ from respot.tables import read_table
 
 
 def image_of(
-    calibration: Calibration, fitted: SourceFit | None, source: Source, options: CorrectionOptions, path: str
+    calibration: Calibration,
+    fitted: SourceFit | None,
+    source: Source,
+    options: CorrectionOptions,
+    path: str,
+    in_tool: bool | None = None,
 ) -> Image:
     """Choose the image.
 
@@ -39,13 +44,15 @@ def image_of(
     options : CorrectionOptions
     path : str
         The calibration, or the reference that it was fitted to, for messages.
+    in_tool : bool or None
+        Whether a tool offset that is taken out again stands in the tool's data; None where nothing says.
 
     Raises
     ------
     BadInputError
         Nothing can be written, or not rightly.
     """
-    if calibration.tool_offset is not None and calibration.kind == "theory" and options.apply is None:
+    if tool_offset_of(calibration) is not None and calibration.kind == "theory" and options.apply is None:
         message = (
             "the calibration has a tool offset, and what becomes of it is for you to say: --apply frames corrects the "
             "tool data and the points, --apply points the points alone, for a simulation that brings its own tool"
@@ -58,7 +65,8 @@ def image_of(
         return _rigid(calibration, options)
     parts = split(calibration, path, inverse=options.inverse)
     cell = _cell(calibration, parts, fitted, source, options)
-    return Compensation(cell, calibration, parts, Choice(options.inverse, options.bases, options.max_residual))
+    choice = Choice(options.inverse, options.bases, options.max_residual, in_tool)
+    return Compensation(cell, calibration, parts, choice)
 
 
 def _snapped(calibration: Calibration, fitted: SourceFit | None, options: CorrectionOptions, path: str) -> Image:

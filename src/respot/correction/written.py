@@ -13,7 +13,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from respot.calibration.calibration import Calibration
+from respot.calibration.effects import tool_shift
 from respot.calibration.effects.catalogue import MECHANISMS, OF_THE_ARM
+from respot.calibration.effects.moved import tip_of
 from respot.calibration.effects.term import Term
 from respot.correction.landing import Errors
 from respot.geometry import Array
@@ -86,6 +88,8 @@ def split(calibration: Calibration, path: str, *, inverse: bool = False) -> Spli
     kept: list[tuple[Term, Array]] = []
     issues: list[Issue] = []
     for term, value in zip(calibration.terms, calibration.values, strict=True):
+        if term.effect == tool_shift.NAME:  # one offset of the tool, whatever it was found beside
+            continue
         remedy = MECHANISMS[term.effect].remedy(term, value).text
         if term.effect == "wrong_frame":
             message = (
@@ -99,13 +103,22 @@ def split(calibration: Calibration, path: str, *, inverse: bool = False) -> Spli
             issues.append(Issue("EFFECT_WRITTEN", message, path))
         else:
             issues.append(Issue("EFFECT_NOT_WRITTEN", f"{term.label} is not written into points. {remedy}", path))
-    offset = [] if calibration.tool_offset is None else ["tool_offset"]
+    offset = tool_offset_of(calibration)
     return Split(
-        Errors([term for term, _ in kept], [value for _, value in kept], calibration.tool_offset),
+        Errors([term for term, _ in kept], [value for _, value in kept], offset),
         issues,
-        [*offset, *(term.label for term, _ in kept)],
+        [*([] if offset is None else [tool_shift.NAME]), *(term.label for term, _ in kept)],
         [term.label for term in calibration.terms if not is_written(term)],
     )
+
+
+def tool_offset_of(calibration: Calibration) -> Array | None:
+    """Offset (3,) of the tool in a calibration, by itself or among other effects [mm]; None without one."""
+    own = calibration.tool_offset
+    if all(term.effect != tool_shift.NAME for term in calibration.terms):
+        return own
+    offset = tip_of(calibration.terms, calibration.values)
+    return offset if own is None else own + offset
 
 
 def _becomes(kind: str, *, inverse: bool) -> str:
