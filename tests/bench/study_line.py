@@ -107,7 +107,7 @@ def workers(line: Path, folder: Path, kills: int, seed: int) -> None:
             for _ in run.stderr:
                 time.sleep(chance.uniform(0, 3))
                 below = workers_of(run.pid)
-                if below and count < kills and chance.uniform() < 0.5:
+                if below and count < kills and chance.random() < 0.5:
                     os.kill(chance.choice(below), signal.SIGKILL)
                     count += 1
         if runs > kills:
