@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
 import sqlite3
@@ -205,7 +206,7 @@ def test_status_while_it_runs_and_a_second_run_on_the_folder(doors, tmp_path):
     record, refusal = seen[:2]
     assert states(record) == {"K": "done", "A": "waiting"}
     assert record["running"].startswith("process ")
-    assert "IN_USE process " in " ".join(refusal.split(": "))
+    assert f"IN_USE process {os.getpid()} on " in " ".join(refusal.split(": "))
     assert "started 20" in refusal
     assert states(migrate(doors, "--status", "-o", out))["A"] == "done"
 

@@ -40,7 +40,8 @@ def show_line(data: Mapping[str, Any], file: LineFile, output: Path | None) -> N
     skipped = sum(robot["state"] == "skipped" for robot in data["robots"])
     if skipped:
         line(f"  {skipped} were done before and did not change")
-    line(f"  in {output}: index.html, line.csv, line.json, robots/NAME")
+    if data["running"] is None:  # the summary comes last
+        line(f"  in {output}: index.html, line.csv, line.json, robots/NAME")
 
 
 def _show_robots(data: Mapping[str, Any]) -> None:

@@ -130,12 +130,12 @@ def run_line(line: LineFile, out: Path, workers: Workers, *, retry: bool, watch:
     folder = OutputFolder(out)
     _check_place(folder.path, line)
     with _ledger_of(folder.path, line) as ledger:
+        ledger.start_run(__version__)
         folder.prepare()
         jobs = [job_of(line, robot) for robot in line.robots]
         known = ledger.known()
         todo = [job for job in jobs if _is_open(job, known.get(job.name), ledger, folder, retry=retry)]
         ledger.plan(jobs, [job.name for job in todo])
-        ledger.start_run(__version__)
         if todo:
             with _executor(workers, folder, line) as (executor, width):
                 _work_through(todo, executor, width, ledger, folder, workers.ship, watch)
@@ -205,13 +205,14 @@ def _who(path: Path) -> str:
 
 
 def running(path: Path) -> Run | None:
-    """Whose run it was that started last on a folder; None where that is not known."""
+    """Whose run is at work on a folder that somebody holds; None where the ledger does not know it yet."""
     try:
         ledger = Ledger(path, readonly=True)
     except BadInputError:  # it has only just begun
         return None
     try:
-        return ledger.last_run()
+        run = ledger.last_run()
+        return None if run is None or run.ended is not None else run
     finally:
         ledger.close()
 
