@@ -10,6 +10,8 @@ import pytest
 from typer.testing import CliRunner
 
 from respot.cli import app
+from respot.issues import BadInputError
+from respot.languages.overlay import COMMENT_MARKS
 from respot.languages.writing import Header, Templates, applied_calibrations
 from respot.source import SourceText
 from tests.correction.small import Converted, krl, lin, rapid
@@ -238,6 +240,17 @@ def test_a_wrong_template_of_added_components_is_seen(tmp_path):
         refused(tmp_path, krl(RELATIVE), plant, str(plant / "krl" / "complete.j2"), "weld.src:", words)
 
 
+@pytest.mark.parametrize("wrong", ["wrong sign", "lost number", "lost digits", "other gaps", "extra line"])
+@pytest.mark.parametrize(("files", "language"), [(krl(), "krl"), (rapid(), "rapid")], ids=["krl", "rapid"])
+def test_a_wrong_template_of_a_frame_is_seen(tmp_path, files, language, wrong):
+    ours = convert(tmp_path, files, "--apply", "frames", name="ours")
+    assert {edit["depth"] for edit in ours.record["edits"]} == {"base"}
+    plant = laid(tmp_path, f"{language}/frame.j2", WRONG[wrong])
+    made = convert(tmp_path, files, "--apply", "frames", "--templates", str(plant))
+    assert (made.code, "BAD_TEMPLATE" in made.err, "frame.j2" in made.err) == (2, True, True), made.err
+    assert not made.folder.exists()
+
+
 @pytest.mark.parametrize(
     ("header", "words"),
     [
@@ -305,6 +318,30 @@ def test_the_header_says_version_hashes_kind_direction_and_cell_and_no_time(lang
     text = Templates(language).header(header, "\r\n")
     assert text == (GOLDEN / f"{language}_{direction}_{kind}.txt").read_text().replace("\n", "\r\n")
     assert applied_calibrations(SourceText("a", text.encode())) == {"b" * 64, "c" * 64, "d" * 64}
+
+
+@pytest.mark.parametrize("language", ["krl", "rapid"])
+@pytest.mark.parametrize(
+    ("header", "template"),
+    [
+        (("align", "theory", True), "respot: << header.version >> << header.direction >> << header.kind >>"),
+        (("align", "theory", False), "respot: << header.version >> << header.direction >> << header.kind >> snapped"),
+        (("align", "theory", False), "{0}\n{1}respot: 1 compensate measured"),
+        (("compensate", "measured", False), "respot: << header.version >> compensated << header.kind >>"),
+        (("compensate", "theory", False), "respot: << header.version >> << header.direction >> measured"),
+    ],
+)
+def test_a_header_that_says_something_else_than_what_was_done_is_refused(tmp_path, language, header, template):
+    mark = COMMENT_MARKS[language]
+    own = shipped_header(language)
+    first = own.splitlines()[0].strip().removeprefix(mark)
+    wrong = own.replace(own.partition("<%- if")[0], f"{mark}{template.format(first, mark)}\n", 1)
+    plant = laid(tmp_path, f"{language}/header.j2", wrong)
+    direction, kind, snapped = header
+    made = Header("1.2.3", direction, kind, "a" * 64, "b" * 64, (), snapped)
+    assert Templates(language).header(made, "\n").count("snapped") == snapped
+    with pytest.raises(BadInputError, match="which says what was done"):
+        Templates(language, plant).header(made, "\n")
 
 
 @pytest.mark.parametrize(("files", "program"), [(krl(), "weld.dat"), (rapid(), "Weld.mod")], ids=["krl", "rapid"])

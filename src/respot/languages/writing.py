@@ -155,8 +155,10 @@ class Templates:
             if not line.strip(" \t").startswith(start) or _HEADER_LINE.fullmatch(f"{line}\n") is None:
                 message = f"writes the line {line!r}: each must begin with {start!r}, or the header is not found again"
                 raise self._bad("header.j2", message)
-        said = f"{start}{header.version} {header.direction} {header.kind}"
-        if not any(line.strip(" \t").startswith(said) for line in text.splitlines()):
+        said = f"{start}{header.version} {header.direction} {header.kind}{' snapped' if header.snapped else ''}"
+        compensated = (header.direction, header.kind) == ("compensate", "measured")
+        as_read = (_COMPENSATED.search(text) is not None, _SNAPPED.search(text) is not None)
+        if said not in text or as_read != (compensated, header.snapped):
             raise self._bad("header.j2", f"has no line {said!r}, which says what was done and for which cell")
         if set(_APPLIED.findall(text)) != {header.calibration_sha256, *header.earlier}:
             message = (
