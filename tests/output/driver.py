@@ -168,12 +168,23 @@ def _prepare(request: dict, said: dict) -> None:
     if request.get("no_sync_disk"):  # as on a system that waits for files one by one
         respot.output.disk.sync_disk = lambda folder: False
     for mount in request.get("mounts", ()):
-        said["mounted"] = _mount(mount)
+        said["mounted"] = _may_mount(mount) and _mount(mount)
     if request.get("largest_file"):
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (request["largest_file"],) * 2)
     if request.get("drop_rights"):
         _drop_rights()
+
+
+def _may_mount(mount: dict) -> bool:
+    """Try it in a child: half of a try cannot be taken back."""
+    probe = os.fork()
+    if probe == 0:
+        try:
+            os._exit(0 if _mount(mount) else 1)
+        except OSError:
+            os._exit(1)
+    return os.waitpid(probe, 0)[1] == 0
 
 
 def _mount(mount: dict) -> bool:
