@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
@@ -153,7 +154,11 @@ class _Reader:
         if found := re.search(r"\bBAS\s*\(\s*(#\w+)\s*(?:,\s*([\w.]+))?", line, re.I):
             self._bas(found[1].upper(), found[2] or "", state)
         for found in re.finditer(r"(?<![\w$])\$BASE\s*=\s*([^,]+|\{[^}]*\})", line, re.I):
-            state.base = self._base(found[1].strip(), path, line[found.start(1) :])
+            expression = line[slice(*split_top(line, ",", found.start(1))[0])]
+            parts = [expression[slice(*part)].strip() for part in split_top(expression, ":")]
+            frames = [state.base if part.upper() == "$BASE" else self._base(part, path) for part in parts]
+            known = [frame for frame in frames if frame is not None]
+            state.base = functools.reduce(np.matmul, known) if len(known) == len(frames) else None
         for found in re.finditer(r"(?<![\w$])\$IPO_MODE\s*=\s*(#\w+|SIPO_MODE\((\w+)(?:\.IPO_FRAME)?\))", line, re.I):
             datum = self._find(found[2], path) if found[2] else None
             mode = datum.fdat.get("IPO_FRAME") if datum is not None else found[1].upper()
@@ -175,7 +180,7 @@ class _Reader:
     def _numbered(self, number: int) -> np.ndarray | None:
         return np.eye(4) if number <= 0 else self.bases.get(number)
 
-    def _base(self, text: str, path: str, rest: str) -> np.ndarray | None:
+    def _base(self, text: str, path: str) -> np.ndarray | None:
         if text.upper() in ("$NULLFRAME", "$WORLD"):
             return np.eye(4)
         if found := re.fullmatch(r"BASE_DATA\s*\[\s*(\d+)\s*\]", text, re.I):
@@ -186,7 +191,9 @@ class _Reader:
             datum = self._find(found[1], path)
             number = datum.fdat.get("BASE_NO", "") if datum is not None else ""
             return self._numbered(int(number)) if number.isdigit() else None
-        if found := re.match(r"\{[^{}]*\}", rest):
+        if re.fullmatch(r"\w+", text) and (datum := self._find(text, path)) is not None:
+            return datum.literal.pose if datum.literal is not None and datum.literal.complete else None
+        if found := re.fullmatch(r"\{[^{}]*\}", text):
             numbers = dict(re.findall(rf"([XYZABC])\s+({NUMBER})", found[0].upper()))
             if set(numbers) >= set("XYZABC"):
                 literal = Literal("krl", path, "", 0, (0, 0), {}, numbers)

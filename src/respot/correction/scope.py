@@ -2,9 +2,10 @@
 
 In scope are the routines that hold a matched spot, what they call, and what calls them: an approach that stands in the
 caller belongs to the part as much as the spot. A target moves if a routine in scope goes to it under a base that a
-matched spot uses. Targets there under other bases (tip dresser, racks) stay. Under the world frame a routine must be
-known as a service routine by its name, or only call the others, since the program does not tell whether the target
-belongs to the part. Every other routine that goes to a moved target comes into scope with it.
+matched spot uses, or one that is composed on the same. Targets there under other bases (tip dresser, racks) stay. Under
+the world frame a routine must be known as a service routine by its name, or only call the others, since the program
+does not tell whether the target belongs to the part. Every other routine that goes to a moved target comes into scope
+with it.
 """
 
 from __future__ import annotations
@@ -335,7 +336,9 @@ class _Part:
 
     def carries(self, task: str, frame: Frame, external_tcp: bool) -> bool:
         own = self.move.workpiece
-        return self.task == task and external_tcp == self.move.external_tcp and own is not None and _same(frame, own)
+        if own is None or self.task != task or external_tcp != self.move.external_tcp:
+            return False
+        return _same(frame, own) or (not frame.foot.world and _same(frame.foot, own.foot))
 
 
 def _held_frames(parts: Iterable[_Part]) -> list[str]:

@@ -66,6 +66,8 @@ class Frame:
         written in several places.
     user_literal : PoseLiteral or None
         Of a work object: the one place of its user frame.
+    stands_on : Frame or None
+        What it is composed of first: ``BASE_DATA[1]:SHIFT`` stands on ``BASE_DATA[1]``, and goes where that goes.
     """
 
     name: str
@@ -79,6 +81,12 @@ class Frame:
     user: RigidTransform | None = None
     literal: PoseLiteral | None = None
     user_literal: PoseLiteral | None = None
+    stands_on: Frame | None = None
+
+    @property
+    def foot(self) -> Frame:
+        """What it stands on in the end; itself if it is not composed."""
+        return self if self.stands_on is None else self.stands_on.foot
 
     def __str__(self) -> str:
         return f"{self.name} {self.label}".rstrip()

@@ -74,6 +74,11 @@ class Frames:
         numbers = range(1, min(most, _MOST_NUMBERS) + 1)
         return [self.numbered(kind, number) for number in numbers if self._symbols.config(f"{kind}_DATA[{number}]")]
 
+    def composed(self, name: str, found: RigidTransform, first: Frame) -> Frame:
+        """Frame of a product; the same expression of the same value on the same frame is the same frame."""
+        key = f"{id(first)}:{name.upper()}:{found.as_matrix().tobytes()!r}"
+        return self._literal.setdefault(key, Frame(name, pose=found, stands_on=first))
+
     def literal(self, name: str, found: RigidTransform, path: str | None = None, line: int | None = None) -> Frame:
         """Frame of an expression; the same expression of the same value is the same frame."""
         key = f"{path}:{name.upper()}:{found.as_matrix().tobytes()!r}"

@@ -178,15 +178,15 @@ class MotionData:
         return self._operands.whole(node, place)
 
     def _composed(self, node: Node, text: str, kind: str, place: Place, state: State) -> Frame | Why:
-        product = IDENTITY
+        product, first = IDENTITY, None
         for operand in node.nodes:
             frame = self.frame(operand, kind, place, state)
             if isinstance(frame, Why):
                 return frame
             if frame.pose is None:
                 return Why(f"{frame}: {frame.unknown}")
-            product = product * frame.pose
-        return self._frames.literal(text, product)
+            product, first = product * frame.pose, first or frame
+        return self._frames.literal(text, product) if first is None else self._frames.composed(text, product, first)
 
     def _load(self, node: Node, place: Place) -> Load | Why:
         text = "".join(node.text.split())
