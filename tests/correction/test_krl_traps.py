@@ -112,3 +112,12 @@ def test_a_harmless_routine_that_sets_no_frame_is_harmless(tmp_path, name):
     )
     assert done.code == 0, done.err
     assert done.edited() == {*SPOT_EDITS, "XV1"}
+
+
+def test_a_base_that_another_is_composed_on_is_not_corrected_itself(tmp_path):
+    """Both would move the targets of the composed one: they stand on it, and are on the same part."""
+    body = "$BASE=$BASE:{X 10.0,Y 0.0,Z 0.0,A 0.0,B 0.0,C 0.0}\nLIN XQ\n"
+    done = convert(tmp_path, krl(body, krl_point("Q", 1, 2, 3)), "--apply", "frames")
+    assert done.code == 0, done.err
+    assert {edit["depth"] for edit in done.record["edits"]} == {"point"}
+    assert done.edited() == {"XS1", "XS2", "XS3", "XS4", "XQ"}
