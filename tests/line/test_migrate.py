@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from respot import __version__
 from respot.cli import app
 from respot.issues import BadInputError
 from respot.line import folder as folders
@@ -345,6 +346,24 @@ def test_a_fault_of_ours_fails_that_robot_and_keeps_its_traceback(doors, tmp_pat
     }
     with closing(sqlite3.connect(tmp_path / "out" / "ledger.sqlite")) as ledger:
         assert "Traceback" in ledger.execute("SELECT details FROM jobs WHERE robot = 'K'").fetchone()[0]
+
+
+def test_a_figure_that_is_no_number_fails_its_robot_and_not_the_summary(doors, tmp_path, monkeypatch):
+    from respot.line import work
+
+    real = work.fit_figures
+    monkeypatch.setattr(work, "fit_figures", lambda record: {**real(record), "after": float("nan")})
+    record = migrate(doors, "-o", tmp_path / "out", code=1)
+    assert [robot["error"]["code"] for robot in record["robots"]] == ["INTERNAL_FAULT"] * 2
+    assert (tmp_path / "out" / "line.json").is_file()
+
+
+def test_the_json_has_what_scripts_rely_on(doors, tmp_path):
+    record = migrate(doors, "-o", tmp_path / "out")
+    assert (record["schema"], record["version"], record["issues"]) == ("respot.migrate/1", __version__, [])
+    promised = {"name", "state", "seconds", "spots", "before", "after", "effects", "edits", "refused", "error"}
+    assert all(promised <= set(robot) for robot in record["robots"])
+    assert record["totals"]["robots"] == 2
 
 
 def test_a_zip_is_read_like_a_folder(doors, tmp_path):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import hashlib
+import json
 import tempfile
 import time
 import traceback
@@ -73,6 +74,8 @@ def _guarded(job: Job, out: Path | None) -> JobResult:
     try:
         with chdir(job.folder):
             result = _work(job, out)
+        # numbers that are none would stop the summary of all robots, long after this one is done
+        json.dumps([result.figures, result.effects, result.edits], allow_nan=False)
         if inputs_changed(job):
             message = "a file changed while it was read: run again when nobody writes to it"
             return JobResult(job.name, "failed", "SOURCE_CHANGED", message)
