@@ -160,6 +160,11 @@ RAPID_READINGS = {
         module('    GetDataVal "w"+stX,wA;\n', WOBJ + "  VAR string stX;\n"),
         "GetDataVal may read it",
     ),
+    "where the robot is, by what a routine may be given": (
+        module("    rAt\\w:=wDoor;\n  ENDPROC\n  PROC rAt(\\PERS wobjdata w)\n    pA:=CRobT(\\Tool:=tool0\\WObj?w);\n",
+               "  VAR robtarget pA;\n"),
+        "a routine that gets it reads it",
+    ),
     "where the robot is": (module("    pA:=CRobT(\\Tool:=tool0);\n", "  VAR robtarget pA;\n"), "code reads CRobT"),
     "the work object in force": (module("    wA:=CWObj();\n", WOBJ), "code reads CWObj"),
     "system data": (module("    GetSysData wA;\n", WOBJ), "code reads GetSysData"),
@@ -225,6 +230,23 @@ def test_rapid_an_element_of_an_array_that_code_may_mean_stays(tmp_path, code):
     assert_kept(tmp_path / "a", under(rapid(data=ARRAY, more=more), "wArr{1}"), "code reads it")
     done = convert(tmp_path / "b", under(rapid(data=ARRAY), "wArr{1}"), *FRAMES, "--keep-config")
     assert depths(done) == {"wArr{1}": "base"}
+
+
+def test_rapid_an_array_that_is_read_by_its_name_in_a_text_stays(tmp_path):
+    more = module('    GetDataVal "wArr",wB;\n', "  VAR wobjdata wB{2};\n")
+    assert_kept(tmp_path, under(rapid(data=ARRAY, more=more), "wArr{1}"), "GetDataVal may read it")
+
+
+def test_rapid_encoded_modules_are_named_where_a_frame_changes(tmp_path):
+    for options, said in (((), False), (FRAMES, True)):
+        folder = tmp_path / str(len(options))
+        backup = folder / "backup/RAPID/TASK1/SYSMOD"
+        backup.mkdir(parents=True)
+        (backup / "Secret.sys").write_bytes(b"\xfc\x00\x01\x02")
+        done = convert(folder, rapid(), *options, "--keep-config")
+        assert done.code == 0, done.err
+        messages = [issue["message"] for issue in done.record["issues"] if issue["code"] == "NOT_CHECKED"]
+        assert any("whether they use wDoor is not known" in message for message in messages) == said
 
 
 def test_rapid_a_work_object_within_other_data_stays(tmp_path):

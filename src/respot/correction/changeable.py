@@ -8,6 +8,7 @@ import numpy as np
 
 from respot.correction.scope import Moving, Scope, may_go, positions_of
 from respot.geometry import IDENTITY
+from respot.issues import Issue
 from respot.program.frames import Frame, FrameReading, Role
 from respot.program.moves import Move
 from respot.program.robot import Robot
@@ -44,6 +45,7 @@ class Changeable:
         for reading in robot.readings:
             self._readings.setdefault(reading.role if reading.frame is None else id(reading.frame), reading)
         self._unread = _unread(robot)
+        self._encoded = [issue.path for issue in robot.issues if issue.code == "BINARY_MODULE" and issue.path]
 
     def objection(self, frame: Frame, role: Role) -> str:
         """Why a frame stays as it is; empty where nothing speaks against a change.
@@ -67,6 +69,14 @@ class Changeable:
             return f"the program does not tell which {role} {_name(homeless)} uses ({homeless.path}:{homeless.line})"
         reading = self._readings.get(id(frame)) or self._readings.get(role)
         return self._users(frame) or (str(reading) if reading else "") or self._turns(frame)
+
+    def unseen(self, frames: Iterable[Frame]) -> list[Issue]:
+        """Say what nobody can look into, for frames that change."""
+        names = ", ".join(map(str, frames))
+        if not self._encoded or not names:
+            return []
+        message = f"{len(self._encoded)} encoded modules cannot be read: whether they use {names} is not known"
+        return [Issue("NOT_CHECKED", message, self._encoded[0])]
 
     def programs(self, frame: Frame) -> set[str]:
         """Programs that move with a frame."""

@@ -79,7 +79,7 @@ class Depth:
     changes : mapping of int to FrameChange
         Changed frames by `id`; none for depth `points`.
     issues : sequence of Issue
-        Frames that are off and stay as they are, and why.
+        Frames that are off and stay as they are, and why; what may use those that change.
     """
 
     changes: Mapping[int, FrameChange] = field(default_factory=dict)
@@ -139,7 +139,7 @@ def depth_of(scope: Scope, causes: Causes, changeable: Changeable) -> Depth:
         )
         for key, reason in kept.items()
     ]
-    return Depth(changes, issues)
+    return Depth(changes, [*issues, *changeable.unseen(change.frame for change in changes.values())])
 
 
 def _after(frame: Frame, users: Sequence[Moving], causes: Causes) -> RigidTransform | None:

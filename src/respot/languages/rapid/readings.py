@@ -19,7 +19,7 @@ from respot.languages.rapid.records import BUILT_IN
 from respot.languages.rapid.references import Datum, resolve, whole
 from respot.languages.rapid.run_time import bound, literal_start
 from respot.languages.rapid.symbols import Module, Symbol, Task
-from respot.program.frames import FrameReading, Role
+from respot.program.frames import Frame, FrameReading, Role
 from respot.program.robot import ProgramFile
 from respot.program.statement import OPAQUE, Node, Statement
 
@@ -105,6 +105,8 @@ class TaskReadings:
         if callee is not None:
             self._in_arguments(seen, call, callee[0], block, module)
             return
+        if call.is_function:  # \WObj?WObj
+            seen.read |= {(id(block), item.given) for item in call.arguments() if item.given}
         if name in _PLACES:
             given = {item.name for item in call.arguments()}
             roles = [role for role, option in _TOLD if option not in given]
@@ -116,7 +118,7 @@ class TaskReadings:
             start = literal_start(values[0]).lower() if values else ""
             exact = bool(values) and values[0].kind == "string"
             for frame, role in self._frames.all():
-                word = frame.name.lower()
+                word = _datum_of(frame)
                 if word == start if exact else word.startswith(start):
                     seen.readings.append(FrameReading(frame, role, f"{call.name} may read it", path, call.line))
 
@@ -228,8 +230,13 @@ class TaskReadings:
         """Yield frames that a file which is not read names."""
         words = {word.lower() for word in re.findall(r"[^\W\d]\w*", data.decode("latin-1"))}
         for frame, role in self._frames.all():
-            if re.split(r"[{.]", frame.name)[0].lower() in words:
+            if _datum_of(frame) in words:
                 yield FrameReading(frame, role, "a file that is no part of the programs names it", path, 1)
+
+
+def _datum_of(frame: Frame) -> str:
+    """Name, in lower case, of the datum that a frame is, or is a part of."""
+    return re.split(r"[{.]", frame.name)[0].lower()
 
 
 def _in_force(call: Invocation, roles: Iterable[Role], path: str) -> Iterator[FrameReading]:
