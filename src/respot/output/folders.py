@@ -58,7 +58,7 @@ def refuse_fixed(folder: Path, advice: str) -> None:
         ``CANNOT_WRITE``: it is where a disk is mounted, or this process works in it.
     """
     own = folder.resolve()
-    if os.path.ismount(own):  # noqa: PTH114 - before Python 3.12 that of a path knows no Windows
+    if os.path.ismount(own):  # before Python 3.12 that of a path knows no Windows
         message = f"is where a disk is mounted, and cannot be replaced as a whole: {advice}"
         raise BadInputError("CANNOT_WRITE", message, str(folder))
     here = Path.cwd()
