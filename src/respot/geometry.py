@@ -54,9 +54,15 @@ def abc_from_rotation(rotation: Rotation, near: npt.ArrayLike | None = None) -> 
         return abc
     old = np.asarray(near, dtype=float)
     found = _turned_near(abc, old)
-    if np.abs(abc[..., 1]).max(initial=0.0) > _NO_LOCK or np.abs(found - old).max(initial=0.0) > _NO_OTHER:
-        found = _nearest_abc(rotation, old)
+    unsure = (np.abs(abc[..., 1]) > _NO_LOCK) | (np.abs(found - old) > _NO_OTHER).any(axis=-1)
+    if unsure.any():
+        found = _nearest_abc(rotation, old) if rotation.single else _replaced_rows(found, rotation, old, unsure)
     return np.where((np.abs(found) > _HALF_TURN) & (np.abs(old) <= _HALF_TURN), _turned_near(found, 0.0), found)
+
+
+def _replaced_rows(abc: Array, rotation: Rotation, near: Array, rows: npt.NDArray[np.bool_]) -> Array:
+    abc[rows] = _nearest_abc(rotation[rows], near[rows])
+    return abc
 
 
 def _turned_near(angles: Array, near: Array | float) -> Array:
@@ -129,6 +135,11 @@ def batch(poses: Sequence[RigidTransform]) -> RigidTransform:
     index = [rows.setdefault(id(item), len(rows)) for item in poses]
     each = {id(item): item for item in poses}
     return RigidTransform.concatenate([each[key] for key in rows])[np.array(index)]
+
+
+def orthogonal(poses: RigidTransform) -> RigidTransform:
+    """Return poses whose rotations have lost what rounding left in products."""
+    return RigidTransform.from_matrix(poses.as_matrix())
 
 
 def replaced(poses: RigidTransform, rows: Sequence[int], others: RigidTransform) -> RigidTransform:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from decimal import Decimal
+from functools import cache, cached_property
 
 #: Decimals that a changed number gets at least, whatever its source had (DESIGN section 4, precision).
 LENGTH_DECIMALS = 3
@@ -109,10 +110,28 @@ class NumberStyle:
         count = min(max(own, decimals), max(MOST_DECIMALS, decimals))
         return NumberStyle(count, point=count > 0)
 
+    @classmethod
+    def changed(cls, text: str, decimals: int) -> NumberStyle:
+        """Style for a changed number: `of` the old one, `at_least` so many decimals."""
+        whole, _, fraction = text.removeprefix("-").partition(".")
+        if text.isascii() and whole.isdigit() and fraction.isdigit():  # as nearly all numbers are
+            return _plain(min(max(len(fraction), decimals), max(MOST_DECIMALS, decimals)))
+        return cls.of(text).at_least(decimals)
+
+    @cached_property
+    def is_plain(self) -> bool:
+        """Whether all there is to it are digits, and a point where there are decimals."""
+        return self == NumberStyle(self.decimals, point=self.decimals > 0)
+
     @property
     def half_digit(self) -> float:
         """Largest difference that rounding to this style can make."""
         return 0.5 * 10.0**-self.decimals
+
+
+@cache
+def _plain(decimals: int) -> NumberStyle:
+    return NumberStyle(decimals, point=decimals > 0)
 
 
 def spell(value: Decimal | float, style: NumberStyle) -> str:
@@ -124,6 +143,9 @@ def spell(value: Decimal | float, style: NumberStyle) -> str:
     '9E+09'
     """
     exact = value if isinstance(value, Decimal) else Decimal(repr(float(value)))
+    if style.is_plain:
+        text = f"{exact:.{style.decimals}f}"
+        return text[1:] if text[0] == "-" and not text.strip("-0.") else text
     if style.base:
         digits = format(round(exact), _FORMATS[style.base.upper()]).rjust(style.digits, "0")
         return f"'{style.base}{digits}'"

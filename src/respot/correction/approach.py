@@ -9,6 +9,7 @@ import numpy as np
 
 from respot.correction.goals import literal
 from respot.correction.joints import Places
+from respot.correction.pose_table import PoseTable
 from respot.correction.sequence import goes_somewhere, sequences
 from respot.geometry import Array
 from respot.kinematics.cell import RobotCell
@@ -47,7 +48,7 @@ def runs_of(cell: RobotCell, model: OpwRobot, robot: Robot, language: Language, 
     followed = [[move for move in moves if goes_somewhere(move)] for moves in sequences(robot, routines)]
     called = {id(move) for moves in followed for move in moves}
     holding = [routine for routine in robot.routines if any(id(move) in called for move in routine.moves)]
-    places = Places(cell, model, language, holding, {}, _as_written)
+    places = Places(cell, model, language, holding, PoseTable(), _as_written)
     joints_of: dict[int, Array] = {}
     sides, likely = _Sides(), dict[int, Array]()
     for moves in followed:

@@ -24,19 +24,21 @@ from respot.calibration.effects.term import Term
 from respot.correction.changeable import Changeable
 from respot.correction.columns import SpotColumns
 from respot.correction.gauge import best_motion, same_motion, size_of
-from respot.correction.goals import Goal, goals_of, stacked
+from respot.correction.goals import Goal, goals_of, poses_of, targets_of
 from respot.correction.image import Direction
 from respot.correction.landing import Errors, Seats, landed, solve
 from respot.correction.points import moves_at_all, new_offset
+from respot.correction.pose_table import PoseTable
 from respot.correction.scope import Moving, Refusal, Scope
 from respot.correction.seats import Seated, Seating
 from respot.correction.written import Split
-from respot.geometry import IDENTITY, Array, distance_mm, turn_deg
+from respot.geometry import IDENTITY, Array, batch, distance_mm, orthogonal, replaced, turn_deg
 from respot.issues import BadInputError, Issue
 from respot.kinematics.cell import Reason, RobotCell
 from respot.languages import Language
 from respot.program.frames import Frame
 from respot.program.moves import Move
+from respot.program.poses import target_poses
 from respot.program.robot import Robot
 
 Bases = Literal["kept", "remeasured"]
@@ -116,7 +118,8 @@ class Compensation:
         self._tools: dict[int, RigidTransform] = {}
         self._taught: dict[Hashable, RigidTransform] = {}
         self._fixed = IDENTITY if self._gauged else calibration.source2reference.inv()
-        self._poses: dict[int, RigidTransform] = {}
+        self._poses = PoseTable()
+        self._places = _Places()
         self._offsets: dict[int, Array] = {}
         self._bases: list[dict[str, Any]] = []
         self.issues: list[Issue] = list(split.issues)
@@ -132,7 +135,7 @@ class Compensation:
         A base that was taught with a wrong tool holds the error that all its points have in common.
         """
         if self._gauged:
-            return self._taught.get(_place(base2spots))
+            return self._taught.get(self._places.of(base2spots))
         rigid = self._fixed if self._solving else self._fixed.inv()
         return rigid if moves_at_all(IDENTITY, rigid) else None
 
@@ -140,10 +143,11 @@ class Compensation:
         """What the data of a tool get on the right: the fitted offset, or on the way back its inverse."""
         return self._tools.get(id(tool))
 
-    def pose(self, moving: Moving) -> RigidTransform:
-        """New ``target2base``."""
-        assert moving.target.pose is not None  # noqa: S101 - scope refuses it
-        return self._poses.get(id(moving), moving.target.pose)
+    def poses(self, moving: Sequence[Moving]) -> RigidTransform:
+        """New ``target2base`` of n > 0 targets."""
+        old = target_poses([item.target for item in moving])
+        rows = [row for row, item in enumerate(moving) if id(item) in self._poses]
+        return replaced(old, rows, self._poses.of([id(moving[row]) for row in rows])) if rows else old
 
     def offset(self, move: Move) -> Array:
         """New components (3,) of an offset along the base [mm]."""
@@ -182,12 +186,14 @@ class Compensation:
         first = seating.seat(closed, errors.terms)
         motions = self._motions(errors, first)
         seated = [(errors, first), *((some, seating.seat(of, some.terms)) for some, of in others)]
-        found: dict[int, RigidTransform] = {}
+        keys: list[int] = []
+        images: list[RigidTransform] = []
         objections: dict[int, tuple[str, str]] = {}
         for some, places in seated:
             objections |= places.objections
-            self._apply(some, places, motions, found, objections)
+            self._apply(some, places, motions, keys, images, objections)
             self.issues += _beyond(some, places)
+        found = PoseTable(keys, RigidTransform.concatenate(images)) if keys else PoseTable()
         refusals = self._take(goals, offsets, found, objections)
         self._taught = self._motions_of_bases(first) if self._gauged and self._tools else {}
         return [*refusals, *self._departures(goals, found)]
@@ -213,8 +219,8 @@ class Compensation:
         offset = self._split.errors.tool_offset
         if offset is None:
             return
-        fitted = {_tool(goal) for goal in goals if goal.spot in self._matched}
-        using = [goal for goal in (*goals, *offsets) if _tool(goal) in fitted]
+        fitted = {self._places.of_tool(goal) for goal in goals if goal.spot in self._matched}
+        using = [goal for goal in (*goals, *offsets) if self._places.of_tool(goal) in fitted]
         tools = {id(tool): tool for goal in using if (tool := goal.move.tool) is not None}
         if changeable is not None:
             reason = next(filter(None, (changeable.objection(tool, "tool") for tool in tools.values())), "")
@@ -238,11 +244,11 @@ class Compensation:
         self, errors: Errors, goals: Sequence[Goal], offsets: Sequence[Goal]
     ) -> tuple[list[Goal], list[tuple[Errors, list[Goal]]]]:
         """Goals with the fitted tool closed; and all others, with the errors that are left there."""
-        tools = {_tool(goal) for goal in goals if goal.spot in self._matched}
-        fitted = [goal for goal in (*goals, *offsets) if _tool(goal) in tools]
+        tools = {self._places.of_tool(goal) for goal in goals if goal.spot in self._matched}
+        fitted = [goal for goal in (*goals, *offsets) if self._places.of_tool(goal) in tools]
         closed = [goal for goal in fitted if goal.welds]
         opened = [goal for goal in fitted if not goal.welds]
-        foreign = [goal for goal in (*goals, *offsets) if _tool(goal) not in tools]
+        foreign = [goal for goal in (*goals, *offsets) if self._places.of_tool(goal) not in tools]
         if foreign and (errors.tool_offset is not None or any(_of_tool(term) for term in errors.terms)):
             names = list(dict.fromkeys(str(goal.move.tool) for goal in foreign))
             message = f"errors of the tool are those of the fitted spots' own: targets of {', '.join(names)} go without"
@@ -278,7 +284,7 @@ class Compensation:
         for row, goal in enumerate(closed.goals):
             if goal.spot in self._matched and goal.target is goal.move.target and id(goal.target) not in seen:
                 seen.add(id(goal.target))
-                found.setdefault(_key(goal), []).append(row)
+                found.setdefault(self._places.of(goal.base2spots), []).append(row)
         return {key: np.array(rows, dtype=np.intp) for key, rows in found.items()}
 
     def _motions_of_bases(self, closed: Seated) -> dict[Hashable, RigidTransform]:
@@ -325,26 +331,30 @@ class Compensation:
         errors: Errors,
         seated: Seated,
         motions: Mapping[Hashable, RigidTransform],
-        found: dict[int, RigidTransform],
+        keys: list[int],
+        images: list[RigidTransform],
         objections: dict[int, tuple[str, str]],
     ) -> None:
-        """Images of goals in the source frame, by `id`; goals that have none go to the objections."""
+        """Add images of goals in the source frame, with their `id`; goals that have none go to the objections."""
         if not seated.goals:
             return
-        motion = stacked(motions.get(_key(goal), self._fixed) for goal in seated.goals)
+        each = [motions.get(self._places.of(goal.base2spots), self._fixed) for goal in seated.goals]
+        motion = orthogonal(batch(each))
         if self._solving:
             solution = solve(errors, seated.seats, motion * seated.seats.poses)
-            images, good, reached = solution.seats.poses, solution.found, solution.reached
+            solved, good, reached = solution.seats.poses, solution.found, solution.reached
             left = solution.left_mm
         else:
             now, reached = seated.seats.at(seated.seats.poses)
-            tools = stacked(map(self._tool_of, seated.goals))
+            tools = orthogonal(batch([self._tool_of(goal) for goal in seated.goals]))
             # what the tool's data will say is no matter of the pose: the flange stays where it is
-            images, good, left = motion.inv() * landed(errors, now) * tools.inv(), reached, np.zeros(len(now))
-        for row, goal in enumerate(seated.goals):
-            if good[row]:
-                found[id(goal)] = images[row]
-            elif not reached[row]:
+            solved, good, left = motion.inv() * landed(errors, now) * tools.inv(), reached, np.zeros(len(now))
+        if good.any():
+            keys += [id(seated.goals[row]) for row in np.flatnonzero(good).tolist()]
+            images.append(solved[good])
+        for row in np.flatnonzero(~good).tolist():
+            goal = seated.goals[row]
+            if not reached[row]:
                 objections[id(goal)] = ("OUT_OF_REACH", "out of reach: the robot cannot go where it would land right")
             else:
                 message = f"no pose lands it where it should: {left[row]:.3g} mm are left. The effects are too large"
@@ -354,7 +364,7 @@ class Compensation:
         self,
         goals: Sequence[Goal],
         offsets: Sequence[Goal],
-        found: Mapping[int, RigidTransform],
+        found: PoseTable,
         objections: Mapping[int, tuple[str, str]],
     ) -> list[Refusal]:
         """Keep new poses and offsets; refuse what has none, or several."""
@@ -362,6 +372,9 @@ class Compensation:
         by_target: dict[int, list[Goal]] = {}
         for goal in goals:
             by_target.setdefault(id(goal.moving), []).append(goal)
+        rows = {id(goal): row for row, goal in enumerate(goal for goal in goals if id(goal) in found)}
+        own = _targets([goal for goal in goals if id(goal) in rows], found)
+        kept: dict[int, int] = {}
         for some in by_target.values():
             moving = some[0].moving
             assert moving is not None  # noqa: S101 - goals of targets have one
@@ -369,13 +382,19 @@ class Compensation:
             if objection is not None:
                 refusals += moving.refusals(*objection)
                 continue
-            poses = [goal.target_of(goal.base2spots.inv() * found[id(goal)]) for goal in some]
-            if all(_agree(poses[0], pose) for pose in poses[1:]):
-                self._poses[id(moving)] = poses[0]
+            first, *others = [rows[id(goal)] for goal in some]
+            kept[id(moving)] = first
+            if not others:
                 continue
-            apart = max(float(distance_mm(poses[0], pose)) for pose in poses)
-            message = f"its motions need poses {apart:.3f} mm apart (tool, or side of play): one literal cannot be both"
+            apart, turned = distance_mm(own[first], own[others]), turn_deg(own[first], own[others])
+            if apart.max() <= _AGREE_MM and turned.max() <= _AGREE_DEG:
+                continue
+            del kept[id(moving)]
+            message = (
+                f"its motions need poses {apart.max():.3f} mm apart (tool, or side of play): one literal cannot be both"
+            )
             refusals += moving.refusals("SHARED_TARGET", message)
+        self._poses = PoseTable([*kept], own[[*kept.values()]]) if kept else PoseTable()
         by_literal = {id(goal.target): goal.moving for goal in goals if goal.moving is not None}
         for goal in offsets:
             anchor = by_literal.get(id(goal.target))
@@ -390,16 +409,19 @@ class Compensation:
             self._offsets[id(goal.move)] = goal.offset_to(there, self._poses[id(anchor)])
         return refusals
 
-    def _departures(self, goals: Sequence[Goal], found: Mapping[int, RigidTransform]) -> list[Refusal]:
+    def _departures(self, goals: Sequence[Goal], found: PoseTable) -> list[Refusal]:
         """Targets that leave the rigid motion of their program's path by more than a person allows."""
-        programs: dict[str, list[Goal]] = {}
-        for goal in goals:
-            if id(goal) in found:
-                programs.setdefault(goal.move.program, []).append(goal)
+        solved = [goal for goal in goals if id(goal) in found]
+        if not solved:
+            return []
+        programs: dict[str, list[int]] = {}
+        for row, goal in enumerate(solved):
+            programs.setdefault(goal.move.program, []).append(row)
+        before = np.asarray((batch([goal.base2spots for goal in solved]) * poses_of(solved)).translation)
+        after = np.asarray(found.of([id(goal) for goal in solved]).translation)
         refusals: list[Refusal] = []
-        for some in programs.values():
-            old = np.array([(goal.base2spots * goal.pose).translation for goal in some])
-            new = np.array([found[id(goal)].translation for goal in some])
+        for rows in programs.values():
+            some, old, new = [solved[row] for row in rows], before[rows], after[rows]
             apart = np.linalg.norm(new - np.asarray(best_motion(old, new).apply(old)), axis=1)
             for row in np.flatnonzero(apart > self._choice.max_residual).tolist():
                 message = (
@@ -411,21 +433,29 @@ class Compensation:
         return refusals
 
 
-def _key(goal: Goal) -> Hashable:
-    return _place(goal.base2spots)
+class _Places:
+    """What bases, and tools, have in common that lie in the same place."""
+
+    def __init__(self) -> None:
+        self._known: dict[int, tuple[RigidTransform, Hashable]] = {}  # a pose that is kept keeps its `id` to itself
+
+    def of(self, pose: RigidTransform) -> Hashable:
+        """Return what tells the place from others."""
+        if id(pose) not in self._known:
+            self._known[id(pose)] = pose, tuple((np.round(pose.as_matrix(), 6) + 0.0).ravel().tolist())
+        return self._known[id(pose)][1]
+
+    def of_tool(self, goal: Goal) -> Hashable:
+        """Return what tells the tool of a goal from others."""
+        tool = goal.move.tool
+        return None if tool is None or tool.pose is None else self.of(tool.pose)
 
 
-def _place(base2spots: RigidTransform) -> Hashable:
-    """What bases have in common that lie in the same place."""
-    return tuple((np.round(base2spots.as_matrix(), 6) + 0.0).ravel().tolist())
-
-
-def _tool(goal: Goal) -> Hashable:
-    """What tools have in common that are the same."""
-    tool = goal.move.tool
-    if tool is None or tool.pose is None:
-        return None
-    return tuple((np.round(tool.pose.as_matrix(), 6) + 0.0).ravel().tolist())
+def _targets(goals: Sequence[Goal], found: PoseTable) -> RigidTransform:
+    """``target2base`` of the targets from which n goals get to their images."""
+    if not goals:
+        return batch([IDENTITY])[:0]
+    return targets_of(goals, batch([goal.base2spots for goal in goals]).inv() * found.of([id(goal) for goal in goals]))
 
 
 def _with_others(scope: Scope, tools: Collection[int]) -> str:
@@ -460,10 +490,6 @@ def _said_of_tool(offset: Array, names: str, in_data: bool, solving: bool, kind:
 
 def _of_tool(term: Term) -> bool:
     return MECHANISMS[term.effect].acts == "tool"
-
-
-def _agree(one: RigidTransform, other: RigidTransform) -> bool:
-    return float(distance_mm(one, other)) <= _AGREE_MM and float(turn_deg(one, other)) <= _AGREE_DEG
 
 
 def _beyond(errors: Errors, seated: Seated) -> list[Issue]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from itertools import pairwise
 
@@ -20,11 +20,12 @@ from respot.correction.marks import still_applied
 from respot.correction.options import CorrectionOptions
 from respot.correction.points import (
     PointEdit,
-    moves_at_all,
+    move_at_all,
     offset_edit,
-    point_edit,
-    printed_pose,
+    point_edits,
+    printed_poses,
 )
+from respot.correction.pose_table import PoseTable
 from respot.correction.preflight import Checked, Preflight
 from respot.correction.scope import Moving, Refusal, Scope, Stay, find_scope
 from respot.correction.sequence import sequences
@@ -35,6 +36,7 @@ from respot.kinematics.from_backup import cell_of
 from respot.languages import LANGUAGES, Language
 from respot.languages.writing import Header, applied_calibrations, templates
 from respot.program.moves import Move
+from respot.program.poses import target_poses
 from respot.program.robot import Robot
 from respot.source import Edit, splice
 
@@ -151,19 +153,17 @@ def correct(
     changeable = Changeable(robot, scope) if options.apply == "frames" else None
     unseen = image.see(scope, changeable)
     depth = Depth() if changeable is None else depth_of(scope, image, changeable)
-    after = {id(moving): image.pose(moving) for moving in scope.moving}
-    written = {id(item): depth.target(item, after[id(item)]) for item in scope.moving}
-    # where a tool changes and the base that was taught with it stays, numbers change though nothing moves
-    moving = [item for item in scope.moving if _moves(item, after[id(item)]) or _moves(item, written[id(item)])]
+    new = _new_poses(scope, image, depth)
+    moving, after = new.moving, new.after
     refused = [*scope.refusals, *unseen, *_too_far(moving, after, options.furthest(kind))]
     cell = cell_of(robot.machine, robot.language, options.robot)
-    printed = {id(item): _printed(robot, language, item, after[id(item)]) for item in moving}
+    printed = _printed(robot, language, moving, after)
     configured = _configure(cell, moving, printed, language, options, refused)
-    flight = Preflight(cell, robot, language, scope, {id(i.target): printed[id(i)] for i in moving}, image.offset)
+    flight = Preflight(cell, robot, language, scope, printed, image.offset)
     together = [*(item.programs for item in scope.moving), *(change.programs for change in depth.changes.values())]
     checked, kept, refused_programs = _preflight(flight, together, moving, options, refused)
-    edits = _edits(robot, language, options, kept, moving, after, written, configured, scope, image, depth)
-    moved = {id(item.target) for item in moving if not kept.holds(item) and _moves(item, after[id(item)])}
+    edits = _edits(robot, language, options, kept, moving, after, new.written, configured, scope, image, depth)
+    moved = {id(item.target) for item in moving if not kept.holds(item) and id(item.target) in new.shifted}
     header = _Header(image.direction, kind, calibration_hash)
     return Correction(
         robot=robot,
@@ -177,7 +177,7 @@ def correct(
         depth=depth,
         transitions=_transitions(robot, scope, moved, refused_programs),
         offsets={id(move): image.offset(move) for move in _turning(scope, kept)},
-        goals={id(item.target): after[id(item)] for item in moving if not kept.holds(item)},
+        goals=after.only([id(item.target) for item in moving if not kept.holds(item)]),
         files=_changed_files(robot, language, options, edits, header),
         reconfigured=all(id(item) in configured for item in moving if language.has_configuration(item.target)),
         issues=[*_issues(robot, cell, scope, moving, spot_moves, edits), *image.issues, *depth.issues, *checked.issues],
@@ -218,40 +218,80 @@ def _check_options(robot: Robot, options: CorrectionOptions) -> None:
         raise BadInputError("BAD_OPTION", f"--programs {wanted} fits no program; there are {known}")
 
 
-def _printed(robot: Robot, language: Language, moving: Moving, after: RigidTransform) -> RigidTransform:
-    return printed_pose(moving.target, after, robot.files[moving.target.path].source.text, language)
+@dataclass(frozen=True, eq=False)
+class _New:
+    """New poses of everything in scope, by `id` of the target.
+
+    Parameters
+    ----------
+    moving : sequence of Moving
+        What gets other numbers: where a tool changes and the base that was taught with it stays, numbers change though
+        nothing moves.
+    shifted : frozenset of int
+        Targets that move at all.
+    after, written : PoseTable
+        New ``target2base`` under the old frames, and under those that are written.
+    """
+
+    moving: Sequence[Moving] = ()
+    shifted: frozenset[int] = frozenset()
+    after: PoseTable = field(default_factory=PoseTable)
+    written: PoseTable = field(default_factory=PoseTable)
 
 
-def _moves(moving: Moving, after: RigidTransform) -> bool:
-    return moving.target.pose is not None and moves_at_all(moving.target.pose, after)
+def _new_poses(scope: Scope, image: Image, depth: Depth) -> _New:
+    if not scope.moving:
+        return _New()
+    keys = [id(item.target) for item in scope.moving]
+    before, after = target_poses([item.target for item in scope.moving]), image.poses(scope.moving)
+    written = depth.targets(scope.moving, after)
+    shifted = move_at_all(before, after)
+    changed = shifted | move_at_all(before, written)
+    return _New(
+        [item for item, changes in zip(scope.moving, changed, strict=True) if changes],
+        frozenset(key for key, moves in zip(keys, shifted, strict=True) if moves),
+        PoseTable(keys, after),
+        PoseTable(keys, written),
+    )
 
 
-def _too_far(
-    moving: Sequence[Moving], after: Mapping[int, RigidTransform], limits: tuple[float, float]
-) -> list[Refusal]:
+def _printed(robot: Robot, language: Language, moving: Sequence[Moving], after: PoseTable) -> PoseTable:
+    """New poses as they will be printed, by `id` of the target."""
+    if not moving:
+        return PoseTable()
+    targets = [item.target for item in moving]
+    keys = [id(target) for target in targets]
+    return PoseTable(keys, printed_poses(targets, after.of(keys), robot.files, language))
+
+
+def _too_far(moving: Sequence[Moving], after: PoseTable, limits: tuple[float, float]) -> list[Refusal]:
+    if not moving:
+        return []
     furthest, widest = limits
+    old, new = target_poses([item.target for item in moving]), after.of([id(item.target) for item in moving])
+    shifts, turns = distance_mm(old, new), turn_deg(old, new)
     found = []
-    for item in moving:
-        assert item.target.pose is not None  # noqa: S101
-        shift = float(distance_mm(item.target.pose, after[id(item)]))
-        turn = float(turn_deg(item.target.pose, after[id(item)]))
-        if shift > furthest or turn > widest:
-            message = f"would move {shift:.1f} mm and {turn:.2f} degrees; --max-shift allows {furthest:g},{widest:g}"
-            found += item.refusals("SHIFT_TOO_LARGE", message)
+    for row in np.flatnonzero((shifts > furthest) | (turns > widest)).tolist():
+        message = (
+            f"would move {shifts[row]:.1f} mm and {turns[row]:.2f} degrees; --max-shift allows {furthest:g},{widest:g}"
+        )
+        found += moving[row].refusals("SHIFT_TOO_LARGE", message)
     return found
 
 
 def _configure(
     cell: RobotCell | Reason,
     moving: Sequence[Moving],
-    after: Mapping[int, RigidTransform],
+    after: PoseTable,
     language: Language,
     options: CorrectionOptions,
     refused: list[Refusal],
 ) -> dict[int, Mapping[str, float]]:
     """Configurations by target; targets without one are added to ``refused``."""
     carrying = [item for item in moving if language.has_configuration(item.target)]
-    results = configure(cell, language, carrying, [after[id(item)] for item in carrying])
+    if not carrying:
+        return {}
+    results = configure(cell, language, carrying, after.of([id(item.target) for item in carrying]))
     found: dict[int, Mapping[str, float]] = {}
     for item, result in zip(carrying, results, strict=True):
         if not result.code:
@@ -306,8 +346,8 @@ def _edits(
     options: CorrectionOptions,
     kept: _Kept,
     moving: Sequence[Moving],
-    after: Mapping[int, RigidTransform],
-    written: Mapping[int, RigidTransform],
+    after: PoseTable,
+    new: PoseTable,
     configured: Mapping[int, Mapping[str, float]],
     scope: Scope,
     image: Image,
@@ -315,10 +355,10 @@ def _edits(
 ) -> list[PointEdit]:
     made = templates(language.name, options.templates)
     edits: list[PointEdit | None] = []
-    for item in moving:
-        if not kept.holds(item):
-            text = robot.files[item.target.path].source.text
-            edits.append(point_edit(item, written[id(item)], configured.get(id(item), {}), text, language, made))
+    written = [item for item in moving if not kept.holds(item)]
+    if written:
+        poses = new.of([id(item.target) for item in written])
+        edits += point_edits(written, poses, configured, robot.files, language, made)
     # one offset that a call hands to a routine with several motions is one literal
     offsets = {(move.offset.path, move.offset.span): move for move in _turning(scope, kept) if move.offset is not None}
     edits += [

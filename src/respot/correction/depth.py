@@ -19,7 +19,7 @@ from scipy.spatial.transform import RigidTransform
 from respot.correction.changeable import Changeable, roles
 from respot.correction.points import PointEdit, in_base, moves_at_all
 from respot.correction.scope import Moving, Scope
-from respot.geometry import Array, distance_mm, turn_deg
+from respot.geometry import Array, batch, distance_mm, replaced, turn_deg
 from respot.issues import Issue
 from respot.languages import Language
 from respot.languages.writing import Templates, changes_of
@@ -85,13 +85,18 @@ class Depth:
     changes: Mapping[int, FrameChange] = field(default_factory=dict)
     issues: Sequence[Issue] = ()
 
-    def target(self, moving: Moving, pose: RigidTransform) -> RigidTransform:
-        """``target2base`` of a target under the new frames, for the one under the old ones."""
-        part, other = _frames(moving.moves[0])
-        left, right = self._change(part), self._change(other)
-        if left is not None:
-            pose = left.inv() * pose
-        return pose if right is None else pose * right
+    def targets(self, moving: Sequence[Moving], poses: RigidTransform) -> RigidTransform:
+        """``target2base`` of n targets under the new frames, for those under the old ones."""
+        pairs = [_frames(item.moves[0]) for item in moving]
+        known = {id(frame): self._change(frame) for pair in pairs for frame in pair} if self.changes else {}
+        lefts, rights = ([known.get(id(pair[side])) for pair in pairs] for side in (0, 1))
+        rows = [row for row, left in enumerate(lefts) if left is not None]
+        if rows:
+            poses = replaced(poses, rows, batch([left for left in lefts if left is not None]).inv() * poses[rows])
+        rows = [row for row, right in enumerate(rights) if right is not None]
+        if rows:
+            poses = replaced(poses, rows, poses[rows] * batch([right for right in rights if right is not None]))
+        return poses
 
     def offset(self, move: Move, values: Array) -> Array:
         """Components (3,) of an offset along the base under the new frames, for those under the old ones [mm]."""
@@ -202,7 +207,7 @@ def frame_edit(
     ----------
     change : FrameChange
     points : mapping of int to RigidTransform
-        New poses of its targets under the old frames, by `id` of what moves.
+        New poses of its targets under the old frames, by `id` of the target.
     robot : Robot
     language, templates :
         How it is written.
@@ -220,14 +225,14 @@ def frame_edit(
         components=components,
     )
     text = robot.files[literal.path].source.text
-    values = language.pose_values(as_target, change.written)
+    values = language.pose_values([as_target], RigidTransform.concatenate([change.written]))[0]
     usual = language.decimals(as_target)
     decimals = {name: max(least, usual[name]) for name, least in language.frame_decimals.items()}
     changes = changes_of(text, literal.numbers, values, decimals)
     if not changes:
         return None
     replacement = templates.frame(text, literal.span, changes)
-    pairs = [(item.target.pose, points[id(item)]) for item in change.users if item.target.pose is not None]
+    pairs = [(item.target.pose, points[id(item.target)]) for item in change.users if item.target.pose is not None]
     return PointEdit(
         path=literal.path,
         line=literal.line,

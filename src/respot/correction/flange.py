@@ -29,14 +29,14 @@ def flanges(
     offsets : mapping of int to (3,) array, optional
         Offset along the base in place of what some motions say [mm], by `id` of the motion.
     """
-    matrices: dict[int, Array] = {}
+    matrices: dict[int, tuple[RigidTransform, Array]] = {}  # a pose that is kept keeps its `id` to itself
 
     def matrix(pose: RigidTransform | None) -> Array:
         if pose is None:
             return _NOWHERE
         if id(pose) not in matrices:
-            matrices[id(pose)] = pose.as_matrix()
-        return matrices[id(pose)]
+            matrices[id(pose)] = pose, pose.as_matrix()
+        return matrices[id(pose)][1]
 
     known = {} if goals is None else goals
     shape = (len(moves), 4, 4)

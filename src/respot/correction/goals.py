@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,8 +10,9 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from respot.correction.scope import Moving, Scope
-from respot.geometry import Array
+from respot.geometry import IDENTITY, Array, batch, replaced
 from respot.program.moves import Move
+from respot.program.poses import target_poses
 from respot.program.targets import Number, Target
 
 
@@ -47,11 +48,14 @@ class Goal:
     @property
     def shifted(self) -> bool:
         """Whether the motion adds a shift to its target."""
-        return self.move.offset is not None or self._tool_shift is not None
+        return self.move.offset is not None or self.tool_shift is not None
 
     @property
-    def _tool_shift(self) -> RigidTransform | None:
+    def tool_shift(self) -> RigidTransform | None:
+        """Shift along the tool that the motion adds; None where there is none, or it is not known."""
         shift = self.move.tool_offset
+        if shift is IDENTITY:
+            return None
         return None if shift is None or not np.any(np.abs(shift.as_matrix() - np.eye(4)) > 0.0) else shift
 
     @property
@@ -64,21 +68,50 @@ class Goal:
     def pose(self) -> RigidTransform:
         """Where the motion goes, ``goal2base``."""
         assert self.target.pose is not None  # noqa: S101 - scope refuses it
-        shift = self._tool_shift
+        shift = self.tool_shift
         goal = self.target.pose if shift is None else self.target.pose * shift
         return goal if self.move.offset is None else RigidTransform.from_translation(self.way) * goal
 
-    def target_of(self, goal: RigidTransform) -> RigidTransform:
-        """``target2base`` of the target from which the motion's own shifts lead to ``goal2base``."""
-        shift = self._tool_shift
-        own = goal if self.move.offset is None else RigidTransform.from_translation(-self.way) * goal
-        return own if shift is None else own * shift.inv()
-
     def offset_to(self, goal: RigidTransform, target: RigidTransform) -> Array:
         """Offset (3,) along the base that leads from ``target2base`` to ``goal2base`` [mm]; it cannot turn."""
-        shift = self._tool_shift
+        shift = self.tool_shift
         start = target if shift is None else target * shift
         return np.asarray(goal.translation - start.translation)
+
+
+def poses_of(goals: Sequence[Goal]) -> RigidTransform:
+    """Where n > 0 motions go, ``goal2base``, as `Goal.pose` says it of each."""
+    poses = target_poses([goal.target for goal in goals])
+    shifts = _tool_shifts(goals)
+    if shifts:
+        poses = replaced(poses, [*shifts], poses[[*shifts]] * batch([*shifts.values()]))
+    along = _along(goals)
+    if along:
+        ways = np.array([goals[row].way for row in along])
+        poses = replaced(poses, along, RigidTransform.from_translation(ways) * poses[along])
+    return poses
+
+
+def targets_of(goals: Sequence[Goal], poses: RigidTransform) -> RigidTransform:
+    """``target2base`` of the targets from which the own shifts of n > 0 motions lead to ``goal2base``."""
+    along = _along(goals)
+    if along:
+        ways = np.array([goals[row].way for row in along])
+        poses = replaced(poses, along, RigidTransform.from_translation(-ways) * poses[along])
+    shifts = _tool_shifts(goals)
+    if shifts:
+        poses = replaced(poses, [*shifts], poses[[*shifts]] * batch([*shifts.values()]).inv())
+    return poses
+
+
+def _along(goals: Sequence[Goal]) -> list[int]:
+    """Rows of motions with an offset along the base."""
+    return [row for row, goal in enumerate(goals) if goal.move.offset is not None]
+
+
+def _tool_shifts(goals: Sequence[Goal]) -> dict[int, RigidTransform]:
+    """Shifts along the tool, by row."""
+    return {row: shift for row, goal in enumerate(goals) if (shift := goal.tool_shift) is not None}
 
 
 def literal(numbers: Iterable[Number | None]) -> Array:
@@ -130,8 +163,3 @@ def _decisive(moving: Moving, spots: Mapping[int, str]) -> Iterator[Goal]:
 
 def _rank(goal: Goal) -> int:
     return (0 if goal.welds else 2) + (1 if goal.shifted else 0)
-
-
-def stacked(poses: Iterable[RigidTransform]) -> RigidTransform:
-    """Return n > 0 poses as one batch."""
-    return RigidTransform.from_matrix(np.stack([pose.as_matrix() for pose in poses]))

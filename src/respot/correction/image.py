@@ -9,7 +9,7 @@ from typing import Any, Literal, Protocol
 from scipy.spatial.transform import RigidTransform
 
 from respot.correction.changeable import Changeable
-from respot.correction.points import new_offset, new_pose
+from respot.correction.points import new_offset, new_poses
 from respot.correction.scope import Moving, Refusal, Scope
 from respot.geometry import Array
 from respot.issues import Issue
@@ -54,8 +54,8 @@ class Image(Protocol):
             Which tools and bases may be changed; None for depth `points`.
         """
 
-    def pose(self, moving: Moving) -> RigidTransform:
-        """New ``target2base``; the old one of a target that was refused."""
+    def poses(self, moving: Sequence[Moving]) -> RigidTransform:
+        """New ``target2base`` of n > 0 targets; the old one of a target that was refused."""
 
     def offset(self, move: Move) -> Array:
         """New components (3,) of the offset of a motion along its base [mm]."""
@@ -91,9 +91,9 @@ class RigidImage:
         """Nothing is refused."""
         return ()
 
-    def pose(self, moving: Moving) -> RigidTransform:
-        """New ``target2base``."""
-        return new_pose(moving, self.motion)
+    def poses(self, moving: Sequence[Moving]) -> RigidTransform:
+        """New ``target2base`` of n > 0 targets."""
+        return new_poses(moving, self.motion)
 
     def offset(self, move: Move) -> Array:
         """New components (3,) of an offset along the base [mm]."""

@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from respot.geometry import IDENTITY, Array
+from respot.correction.pose_table import PoseTable
+from respot.geometry import IDENTITY, Array, replaced
 from respot.kinematics.cell import Reason, RobotCell
-from respot.kinematics.configuration import all_solutions, nearest_inside, taught_joints
-from respot.kinematics.motion_chain import Chain, chain_of, stacked, standing
+from respot.kinematics.configuration import all_solutions, nearest_inside, nearest_solution, taught_joints
+from respot.kinematics.motion_chain import Chain, chains_of, standing
 from respot.kinematics.opw import OpwRobot
 from respot.languages import Language
 from respot.program.moves import Motion, Move
+from respot.program.poses import goal_poses, target_poses
 from respot.program.robot import Routine
 from respot.program.targets import Target, TargetKind
 
 #: Fields of a joint position.
 JOINTS = {"krl": tuple(f"A{n}" for n in range(1, 7)), "rapid": tuple(f"rax_{n}" for n in range(1, 7))}
 _UNKNOWN = np.full(6, np.nan)
+
+
+#: Motions that are solved at once: the trials of full turns take 5 kB each.
+_AT_ONCE = 4096
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,10 +40,6 @@ class Place:
         The target that carries it; of a motion relative to the last position the target before it.
     before, after : Array
         All joint solutions, shape (8, 6), NaN where there is none.
-    taught : Array
-        Joints that its own configuration defines, shape (6,), NaN where none does.
-    configured : bool
-        It carries a configuration.
     flange : RigidTransform
         Where the flange comes after the correction, in the robot base.
     """
@@ -44,20 +47,37 @@ class Place:
     target: Target
     before: Array
     after: Array
-    taught: Array
-    configured: bool
     flange: RigidTransform
 
 
 @dataclass(frozen=True, eq=False)
 class _Posed:
-    """A motion and its poses in the base: the target itself, and with offsets before and after the correction."""
+    """A motion with a known goal: its target, and the motion from whose goal a relative one starts (its row)."""
 
     move: Move
     target: Target
-    own: RigidTransform
-    before: RigidTransform
-    after: RigidTransform
+    start: int | None
+    rank: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Solved:
+    """n motions whose chains are known.
+
+    Parameters
+    ----------
+    before, after : (n, 8, 6) arrays
+        All joint solutions, NaN where there is none.
+    configured : (n,) array of bool
+        They carry a configuration.
+    settled : (3, n, 6) array
+        Joints where the configuration decides: before, and after at the new place and at the old one.
+    """
+
+    before: Array
+    after: Array
+    configured: NDArray[np.bool_]
+    settled: Array
 
 
 class Places:
@@ -73,7 +93,7 @@ class Places:
         Its language.
     routines : sequence of Routine
         The routines.
-    printed : mapping of int to RigidTransform
+    printed : PoseTable
         New poses in their base by `id` of the target.
     offset : callable
         New components (3,) of the offset of a motion along its base [mm].
@@ -85,15 +105,42 @@ class Places:
         model: OpwRobot,
         language: Language,
         routines: Sequence[Routine],
-        printed: Mapping[int, RigidTransform],
+        printed: PoseTable,
         offset: Callable[[Move], Array],
     ) -> None:
         self._cell, self._model, self._language = cell, model, language
         self._printed, self._offset = printed, offset
-        self.by_move: dict[int, Place] = {}
         #: Motions to a target without a place, and why.
         self.unknown: list[tuple[Move, Target, Reason]] = []
-        self._solve([item for routine in routines for item in self._posed(routine)])
+        self._posed: list[_Posed] = []
+        for routine in routines:
+            self._follow(routine)
+        own, before, after = self._goals()
+        self._rows: dict[int, int] = {}
+        self._solve(own, before, after)
+
+    def __contains__(self, move: Move) -> bool:
+        return id(move) in self._rows
+
+    def target(self, move: Move) -> Target | None:
+        """Target that carries a motion; None where it has no place."""
+        row = self._rows.get(id(move))
+        return None if row is None else self._known[row].target
+
+    def rows(self, moves: Sequence[Move]) -> NDArray[np.intp]:
+        """Row (n,) of each motion, -1 where it has no place."""
+        return np.array([self._rows.get(id(move), -1) for move in moves], dtype=np.intp)
+
+    @property
+    def reached(self) -> NDArray[np.bool_]:
+        """Which rows have any joints after the correction."""
+        if not self._rows:
+            return np.empty(0, dtype=np.bool_)
+        return np.asarray(np.asarray(np.isfinite(self._solved.after).all(axis=2)).any(axis=1))
+
+    def place(self, row: int) -> Place:
+        """Return the motion of a row."""
+        return Place(self._known[row].target, self._solved.before[row], self._solved.after[row], self._flange[row])
 
     def joints(self, sequence: Sequence[Move], moved: Collection[int]) -> tuple[Array, Array]:
         """Joints (n, 6) before and after along a sequence; ``moved`` holds the `id` of each target that moves.
@@ -101,19 +148,24 @@ class Places:
         Without a configuration of its own a motion ends nearest to where it starts; NaN where that is not known.
         """
         before, after = np.full((len(sequence), 6), np.nan), np.full((len(sequence), 6), np.nan)
-        for row, move in enumerate(sequence):
+        rows = self.rows(sequence)
+        carrying = rows >= 0
+        configured = np.zeros(len(sequence), dtype=np.bool_)
+        if carrying.any():
+            known, solved = rows[carrying], self._solved
+            moves = np.array([id(self._known[row].target) in moved for row in known.tolist()])
+            configured[carrying] = solved.configured[known]
+            before[carrying] = solved.settled[0, known]
+            after[carrying] = np.where(moves[:, None], solved.settled[1, known], solved.settled[2, known])
+        for row in np.flatnonzero(~configured).tolist():
+            move = sequence[row]
             if move.target is not None and move.target.kind is TargetKind.JOINTS:
                 before[row] = after[row] = _joint_position(self._cell.language, move.target)
-                continue
-            place = self.by_move.get(id(move))
-            if place is None:
-                continue
-            moves = id(place.target) in moved
-            last = (before[row - 1], after[row - 1]) if row else (_UNKNOWN, _UNKNOWN)
-            free = move.motion is Motion.JOINT and not place.configured
-            before[row] = self._near(place.before, place.taught if place.configured else last[0], free)
-            start = before[row] if place.configured else last[1]
-            after[row] = self._near(place.after if moves else place.before, start, free)
+            elif carrying[row]:
+                place, free = self.place(int(rows[row])), move.motion is Motion.JOINT
+                last = (before[row - 1], after[row - 1]) if row else (_UNKNOWN, _UNKNOWN)
+                before[row] = self._near(place.before, last[0], free)
+                after[row] = self._near(place.after if id(place.target) in moved else place.before, last[1], free)
         return before, after
 
     def _near(self, branches: Array, near: Array, free: bool) -> Array:
@@ -123,81 +175,123 @@ class Places:
         limits = self._model.limits_deg if free else None
         return np.asarray(nearest_inside(self._model, branches[None], near[None], limits)[0])
 
-    def _posed(self, routine: Routine) -> Iterator[_Posed]:
-        """Motions of a routine to poses that the program tells, in order."""
-        last: _Posed | None = None
-        for step in routine.steps:
-            if isinstance(step, Move):
-                last = self._pose(step, last)
-                if last is not None:
-                    yield last
-            else:
-                last = None
+    # --- where motions go
 
-    def _pose(self, move: Move, last: _Posed | None) -> _Posed | None:
+    def _follow(self, routine: Routine) -> None:
+        """Add the motions of a routine to poses that the program tells, in order."""
+        last: int | None = None
+        for step in routine.steps:
+            found = self._goal(step, last) if isinstance(step, Move) else None
+            last = None
+            if found is not None:
+                last = len(self._posed)
+                self._posed.append(found)
+
+    def _goal(self, move: Move, last: int | None) -> _Posed | None:
         if move.unknown or (move.offset is not None and not move.offset.literal):
             return None
         start = self._start(move, last)
         if start is None:
             return None
-        target, own, before, after = start
         if move.tool_offset is None:
-            self.unknown.append(
-                (move, target, Reason("NOT_CHECKED", "its shift along the tool is computed at run time"))
-            )
+            reason = Reason("NOT_CHECKED", "its shift along the tool is computed at run time")
+            self.unknown.append((move, start.target, reason))
             return None
-        if move.tool_offset is not IDENTITY:  # status and turn or confdata are those of the bare target
-            before, after = before * move.tool_offset, after * move.tool_offset
-        if move.offset is None:
-            return _Posed(move, target, own, before, after)
-        if move.base2spots is None:
-            return None
-        old = np.array([0.0 if number is None else float(number.value) for number in move.offset.numbers])
-        return _Posed(move, target, own, _shifted(before, old), _shifted(after, self._offset(move)))
+        return None if move.offset is not None and move.base2spots is None else start
 
-    def _start(
-        self, move: Move, last: _Posed | None
-    ) -> tuple[Target, RigidTransform, RigidTransform, RigidTransform] | None:
-        """Target with its own pose, before and after; of a relative motion where the last motion went."""
+    def _start(self, move: Move, last: int | None) -> _Posed | None:
+        """A motion to its target; a relative one starts where the last motion went."""
         if move.target is not None:
-            own = move.target.pose
-            return None if own is None else (move.target, own, own, self._printed.get(id(move.target), own))
-        if move.offset is None and move.tool_offset is IDENTITY:
+            return _Posed(move, move.target, None, 0) if move.target.components else None
+        if last is None or (move.offset is None and move.tool_offset is IDENTITY):
             return None
-        if last is None or (last.move.tool, last.move.base) != (move.tool, move.base):
+        before = self._posed[last]
+        if (before.move.tool, before.move.base) != (move.tool, move.base):
             return None
-        return last.target, last.own, last.before, last.after
+        return _Posed(move, before.target, last, before.rank + 1)
 
-    def _solve(self, posed: Sequence[_Posed]) -> None:
-        """Solve all motions at once."""
-        solvable: list[tuple[_Posed, Sequence[Chain]]] = []
-        for item in posed:
-            first = chain_of(self._cell, item.move, item.target, item.own)
-            chains = [
-                first if pose is item.own else chain_of(self._cell, item.move, item.target, pose)
-                for pose in (item.own, item.before, item.after)
-            ]
-            known = [chain for chain in chains if isinstance(chain, Chain)]
-            if len(known) == len(chains):
-                solvable.append((item, known))
+    def _goals(self) -> tuple[Array, Array, Array]:
+        """Matrices (n, 4, 4) of the targets themselves, and of the goals before and after the correction."""
+        count = len(self._posed)
+        own, before, after = (np.empty((count, 4, 4)) for _ in range(3))
+        by_rank: dict[int, list[int]] = {}
+        for row, posed in enumerate(self._posed):
+            by_rank.setdefault(posed.rank, []).append(row)
+        for rank in sorted(by_rank):  # a relative motion starts at a goal of the rank below
+            rows = by_rank[rank]
+            if rank == 0:
+                targets = target_poses([self._posed[row].target for row in rows])
+                own[rows] = targets.as_matrix()
+                starts = targets, self._moved(rows, targets)
             else:
-                self.unknown.append((item.move, item.target, next(c for c in chains if isinstance(c, Reason))))
-        if not solvable:
-            return
-        own, before, after = (stacked([chains[n] for _, chains in solvable]) for n in range(3))
+                above = [start for row in rows if (start := self._posed[row].start) is not None]
+                own[rows] = own[above]
+                starts = _rigid(before[above]), _rigid(after[above])
+            moves = [self._posed[row].move for row in rows]
+            before[rows] = goal_poses(moves, starts[0]).as_matrix()
+            after[rows] = goal_poses(moves, starts[1], self._offset).as_matrix()
+        return own, before, after
+
+    def _moved(self, rows: Sequence[int], targets: RigidTransform) -> RigidTransform:
+        """Targets where they will be."""
+        keys = [id(self._posed[row].target) for row in rows]
+        places = [at for at, key in enumerate(keys) if key in self._printed]
+        return replaced(targets, places, self._printed.of([keys[at] for at in places])) if places else targets
+
+    # --- joints
+
+    def _solve(self, own: Array, before: Array, after: Array) -> None:
+        """Solve all motions."""
+        self._known: list[_Posed] = []
+        found: list[_Solved] = []
+        flange: list[RigidTransform] = []
+        for start in range(0, len(self._posed), _AT_ONCE):
+            some = slice(start, start + _AT_ONCE)
+            posed = self._posed[some]
+            poses = [_rigid(each[some]) for each in (own, before, after)]
+            targets = [item.target for item in posed]
+            reasons, chains = chains_of(self._cell, [item.move for item in posed], targets, poses)
+            self.unknown += [
+                (item.move, item.target, reason)
+                for item, reason in zip(posed, reasons, strict=True)
+                if reason is not None
+            ]
+            if chains:
+                known = [item for item, reason in zip(posed, reasons, strict=True) if reason is None]
+                self._known += known
+                solved, there = self._solved_chains(known, *chains)
+                found.append(solved)
+                flange.append(there)
+        self._rows = {id(item.move): row for row, item in enumerate(self._known)}
+        if found:
+            self._solved = _Solved(
+                np.concatenate([part.before for part in found]),
+                np.concatenate([part.after for part in found]),
+                np.concatenate([part.configured for part in found]),
+                np.concatenate([part.settled for part in found], axis=1),
+            )
+            self._flange = RigidTransform.concatenate(flange)
+
+    def _solved_chains(
+        self, posed: Sequence[_Posed], own: Chain, before: Chain, after: Chain
+    ) -> tuple[_Solved, RigidTransform]:
         cell = standing(self._cell, own)
-        solved = [all_solutions(cell, self._model, c.tool2world, c.tool2flange, len(solvable)) for c in (before, after)]
+        old, new = (
+            all_solutions(cell, self._model, chain.tool2world, chain.tool2flange, len(posed))
+            for chain in (before, after)
+        )
         flange = cell.flange2base(after.tool2world, after.tool2flange)
-        numbers = [self._numbers(item.target) for item, _ in solvable]
+        numbers = [self._numbers(item.target) for item in posed]
+        carried = np.array([row is not None for row in numbers])
         width = len(self._language.configuration_fields)
         configuration = np.array([row if row is not None else [0] * width for row in numbers])
         taught, _ = taught_joints(cell, own.tool2flange, own.tool2world, configuration)
-        for row, (item, _) in enumerate(solvable):
-            carried = numbers[row] is not None
-            own_joints = taught[row] if carried else _UNKNOWN
-            self.by_move[id(item.move)] = Place(
-                item.target, solved[0][row], solved[1][row], own_joints, carried, flange[row]
-            )
+        taught[~carried] = np.nan
+        settled = np.full((3, len(posed), 6), np.nan)
+        settled[0] = _nearest(self._model, old, taught)
+        settled[1] = _nearest(self._model, new, settled[0])
+        settled[2] = _nearest(self._model, old, settled[0])
+        return _Solved(old, new, carried, settled), flange
 
     def _numbers(self, target: Target) -> list[int] | None:
         """Configuration of a target; None where it carries none."""
@@ -206,8 +300,17 @@ class Places:
         return found if len(found) == len(numbers) else None
 
 
-def _shifted(pose: RigidTransform, way: Array) -> RigidTransform:
-    return RigidTransform.from_components(pose.translation + way, pose.rotation)
+def _nearest(model: OpwRobot, branches: Array, near: Array) -> Array:
+    """Of the solutions (n, 8, 6) those nearest to ``near`` (n, 6), same shape; NaN where that is not known."""
+    known = np.isfinite(near).all(axis=1)
+    found = np.full_like(near, np.nan)
+    if known.any():
+        found[known] = nearest_solution(model, branches[known], near[known])
+    return found
+
+
+def _rigid(matrices: Array) -> RigidTransform:
+    return RigidTransform.from_matrix(matrices)
 
 
 def _joint_position(language: str, target: Target) -> Array:

@@ -7,18 +7,21 @@ compared in the part frame, in which the targets are programmed: B is one, and T
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from respot.correction.scope import Moving
-from respot.geometry import Array, distance_mm, rotation_from_abc, rotation_from_quaternion, turn_deg
+from respot.geometry import Array, batch, distance_mm, pose, rotation_from_abc, rotation_from_quaternion, turn_deg
 from respot.languages import Language
 from respot.languages.writing import Change, Templates, changes_of, finest
 from respot.program.moves import BaseOffset, Move
+from respot.program.poses import target_poses
+from respot.program.robot import ProgramFile
 from respot.program.targets import Target
 from respot.source import Edit
 from respot.tolerance import LENGTH_DECIMALS, SAME_POSITION_MM, SAME_ROTATION_DEG, NumberStyle, spell
@@ -70,74 +73,86 @@ def in_base(base: RigidTransform, source2reference: RigidTransform) -> RigidTran
 
 def moves_at_all(before: RigidTransform, after: RigidTransform) -> bool:
     """Whether two poses differ by more than numerical noise."""
-    same_place = float(distance_mm(before, after)) <= SAME_POSITION_MM
-    return not (same_place and float(turn_deg(before, after)) <= SAME_ROTATION_DEG)
+    return bool(move_at_all(before, after))
 
 
-def new_pose(moving: Moving, source2reference: RigidTransform) -> RigidTransform:
-    """Return the new ``target2base`` of a target."""
-    assert moving.target.pose is not None  # noqa: S101 - scope refuses it
-    return in_base(moving.base2spots, source2reference) * moving.target.pose
+def move_at_all(before: RigidTransform, after: RigidTransform) -> NDArray[np.bool_]:
+    """Whether n poses (n,) differ from n others by more than numerical noise."""
+    same_place = distance_mm(before, after) <= SAME_POSITION_MM
+    return np.asarray(~(same_place & (turn_deg(before, after) <= SAME_ROTATION_DEG)))
 
 
-def printed_pose(target: Target, after: RigidTransform, text: str, language: Language) -> RigidTransform:
-    """Pose that the robot reads once ``after`` is written with the digits that the literal gets."""
-    values = language.pose_values(target, after)
-    decimals, read = language.decimals(target), {}
-    for name, value in values.items():
-        style = NumberStyle.of(text[slice(*target.numbers[name].span)]).at_least(decimals[name])
-        read[name] = float(spell(value, style))
-    numbers = list(read.values())
-    if len(numbers) not in (6, 7):
-        return after
-    rotation = rotation_from_quaternion(numbers[3:]) if len(numbers) == 7 else rotation_from_abc(numbers[3:])
-    return RigidTransform.from_components(numbers[:3], rotation)
+def new_poses(moving: Sequence[Moving], source2reference: RigidTransform) -> RigidTransform:
+    """Return the new ``target2base`` of n > 0 targets."""
+    bases = {id(item.base2spots): item.base2spots for item in moving}
+    turned = {key: in_base(base, source2reference) for key, base in bases.items()}
+    return batch([turned[id(item.base2spots)] for item in moving]) * target_poses([item.target for item in moving])
 
 
-def point_edit(
-    moving: Moving,
+def printed_poses(
+    targets: Sequence[Target], after: RigidTransform, files: Mapping[str, ProgramFile], language: Language
+) -> RigidTransform:
+    """Poses that the robot reads once n new ones are written with the digits that their literals get."""
+    rows = []
+    for target, values in zip(targets, language.pose_values(targets, after), strict=True):
+        text, decimals = files[target.path].source.text, language.decimals(target)
+        spans = {name: target.numbers[name].span for name in values}
+        styles = {name: NumberStyle.changed(text[slice(*span)], decimals[name]) for name, span in spans.items()}
+        rows.append([float(spell(value, styles[name])) for name, value in values.items()])
+    numbers = np.array(rows)
+    turned = rotation_from_quaternion if numbers.shape[1] == 7 else rotation_from_abc
+    return pose(numbers[:, :3], turned(numbers[:, 3:]))
+
+
+def point_edits(
+    moving: Sequence[Moving],
     after: RigidTransform,
-    configuration: Mapping[str, float],
-    text: str,
+    configured: Mapping[int, Mapping[str, float]],
+    files: Mapping[str, ProgramFile],
     language: Language,
     templates: Templates,
-) -> PointEdit | None:
-    """Edit of a target; None where its literal already says the new pose to the last digit.
+) -> Iterator[PointEdit]:
+    """Edits of n targets; none of one whose literal already says the new pose to the last digit.
 
     Parameters
     ----------
-    moving : Moving
-        The target.
+    moving : sequence of Moving
+        The targets.
     after : RigidTransform
-        Its new pose in its base.
-    configuration : mapping of str to float
-        New values of status and turn or confdata.
-    text : str
-        Its file.
+        Their new poses in their bases.
+    configured : mapping of int to mapping of str to float
+        New values of status and turn or confdata, by `id` of what moves.
+    files : mapping of str to ProgramFile
+        Their files.
     language, templates :
-        How it is written.
+        How they are written.
     """
-    target = moving.target
-    assert target.pose is not None  # noqa: S101
+    if not moving:
+        return
+    targets = [item.target for item in moving]
+    before = target_poses(targets)
     # only its configuration may change where a base or tool takes it along
-    moves = moves_at_all(target.pose, after)
-    values = {**(language.pose_values(target, after) if moves else {}), **configuration}
-    changes = changes_of(text, target.numbers, values, language.decimals(target))
-    if not changes:
-        return None
-    replacement = templates.literal(text, target.span, changes)
-    return PointEdit(
-        path=target.path,
-        line=target.line,
-        target=target.name,
-        programs=frozenset(moving.programs),
-        edit=Edit(target.span, replacement, "point"),
-        before=text[slice(*target.span)],
-        after=replacement,
-        intended=values,
-        shift_mm=float(distance_mm(target.pose, after)) if moves else 0.0,
-        turn_deg=float(turn_deg(target.pose, after)) if moves else 0.0,
-    )
+    moves, shifts, turns = move_at_all(before, after), distance_mm(before, after), turn_deg(before, after)
+    poses = language.pose_values(targets, after)
+    for row, (item, target) in enumerate(zip(moving, targets, strict=True)):
+        values = {**(poses[row] if moves[row] else {}), **configured.get(id(item), {})}
+        text = files[target.path].source.text
+        changes = changes_of(text, target.numbers, values, language.decimals(target))
+        if not changes:
+            continue
+        replacement = templates.literal(text, target.span, changes)
+        yield PointEdit(
+            path=target.path,
+            line=target.line,
+            target=target.name,
+            programs=frozenset(item.programs),
+            edit=Edit(target.span, replacement, "point"),
+            before=text[slice(*target.span)],
+            after=replacement,
+            intended=values,
+            shift_mm=float(shifts[row]) if moves[row] else 0.0,
+            turn_deg=float(turns[row]) if moves[row] else 0.0,
+        )
 
 
 def new_offset(offset: BaseOffset, base: RigidTransform, source2reference: RigidTransform) -> Array:

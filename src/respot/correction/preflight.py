@@ -6,13 +6,14 @@ What a correction brings nearer to a singularity or a limit, or onto another bra
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform
+from numpy.typing import NDArray
 
 from respot.correction.joints import Place, Places
+from respot.correction.pose_table import PoseTable
 from respot.correction.scope import Refusal, Scope
 from respot.correction.sequence import goes_somewhere, sequences
 from respot.geometry import Array
@@ -24,7 +25,7 @@ from respot.kinematics.turns import TURNS, chosen_turn, outside
 from respot.languages import Language
 from respot.program.moves import Move
 from respot.program.robot import Robot
-from respot.program.targets import TargetKind
+from respot.program.targets import Target, TargetKind
 
 _WHAT = {
     "NEAR_SINGULARITY": "nearer to a singularity than before the correction",
@@ -54,7 +55,7 @@ class Preflight:
         Its language.
     scope : Scope
         What moves.
-    printed : mapping of int to RigidTransform
+    printed : PoseTable
         New poses in their base as they will be printed, by `id` of the target.
     offset : callable
         New components (3,) of the offset of a motion along its base [mm].
@@ -66,7 +67,7 @@ class Preflight:
         robot: Robot,
         language: Language,
         scope: Scope,
-        printed: Mapping[int, RigidTransform],
+        printed: PoseTable,
         offset: Callable[[Move], Array],
     ) -> None:
         self._cell: RobotCell | None = None
@@ -78,6 +79,8 @@ class Preflight:
             called = {id(move) for sequence in self._sequences for move in sequence}
             routines = [r for r in robot.routines if any(id(move) in called for move in r.moves)]
             self._places = Places(cell, cell.model, language, routines, printed, offset)
+            # the last row is that of motions without a place
+            self._reached = np.append(self._places.reached, False)
 
     def check(self, moved: Collection[int]) -> Checked:
         """Check with the targets ``moved``, by `id`, at their new place and all others at their old one."""
@@ -98,18 +101,26 @@ class Preflight:
     def _refusals(
         self, cell: RobotCell, sequence: Sequence[Move], before: Array, after: Array, moved: Collection[int]
     ) -> Iterator[Refusal]:
-        for row, move in enumerate(sequence):
-            place = self._places.by_move.get(id(move))
-            if place is not None and id(place.target) in moved:
-                reason = self._objection(cell, place, before[row], after[row])
+        rows = self._places.rows(sequence)
+        doubtful = (rows >= 0) & ~(self._reached[rows] & self._allowed(cell, after))
+        for at in np.flatnonzero(doubtful).tolist():
+            place = self._places.place(int(rows[at]))
+            if id(place.target) in moved:
+                reason = self._objection(cell, place, before[at], after[at])
                 if reason is not None:
-                    yield _refusal(move, place, reason)
+                    yield _refusal(sequence[at], place.target, reason)
         for finding in check_travel(before, after):
             for move in sequence[finding.row - 1 : finding.row + 1]:
-                place = self._places.by_move.get(id(move))
-                if place is not None and id(place.target) in moved:
+                target = self._places.target(move)
+                if target is not None and id(target) in moved:
                     message = f"on the way to {sequence[finding.row].target or 'the next position'}: {finding.message}"
-                    yield _refusal(move, place, Reason(finding.code, message))
+                    yield _refusal(move, target, Reason(finding.code, message))
+
+    def _allowed(self, cell: RobotCell, joints: Array) -> NDArray[np.bool_]:
+        """Which rows of joints (n, 6) are known and inside the limits."""
+        if cell.limits is None:
+            return np.ones(len(joints), dtype=np.bool_)
+        return np.asarray(np.isfinite(joints).all(axis=1) & ~(outside(joints, cell.limits) > 0.0).any(axis=1))
 
     def _objection(self, cell: RobotCell, place: Place, before: Array, after: Array) -> Reason | None:
         """Say why the arm must not go to a moved target."""
@@ -146,8 +157,8 @@ class Preflight:
         return [Issue("NOT_CHECKED", message, move.path, move.line)]
 
 
-def _refusal(move: Move, place: Place, reason: Reason) -> Refusal:
-    return Refusal(move.program, place.target.name, reason.code, reason.message, move.path, move.line)
+def _refusal(move: Move, target: Target, reason: Reason) -> Refusal:
+    return Refusal(move.program, target.name, reason.code, reason.message, move.path, move.line)
 
 
 def _grouped(findings: Sequence[tuple[Move, Finding]]) -> list[Issue]:

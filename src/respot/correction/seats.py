@@ -14,14 +14,13 @@ from respot.calibration.observations import DOWN, Observations
 from respot.calibration.spot_frames import spot_frames
 from respot.correction.approach import Runs, runs_of
 from respot.correction.columns import SpotColumns, names_at, spots_ahead
-from respot.correction.goals import Goal, stacked
+from respot.correction.goals import Goal, poses_of
 from respot.correction.landing import Seats
 from respot.correction.scope import Scope
-from respot.geometry import IDENTITY
+from respot.geometry import IDENTITY, batch, orthogonal
 from respot.kinematics.cell import Reason, RobotCell
 from respot.kinematics.gravity import gravity_in_base
-from respot.kinematics.motion_chain import Chain, chain_of, external_axes, standing
-from respot.kinematics.motion_chain import stacked as stacked_chains
+from respot.kinematics.motion_chain import Chain, chains_of, standing
 from respot.kinematics.opw import OpwRobot
 from respot.languages import Language
 from respot.program.robot import Robot
@@ -88,18 +87,23 @@ class Seating:
     def seat(self, goals: Sequence[Goal], terms: Sequence[Term]) -> Seated:
         """Seat goals for some terms; a goal that one of them cannot be computed at is left out, with the reason."""
         objections: dict[int, tuple[str, str]] = {}
-        chains: list[Chain | None] = []
-        kept: list[Goal] = []
+        told: list[Goal] = []
         for goal in goals:
-            chain = self._chain(goal)
-            if isinstance(chain, Reason):
-                objections[id(goal)] = (chain.code, chain.message)
+            reason = _not_told(goal)
+            if reason is None:
+                told.append(goal)
             else:
-                kept.append(goal)
-                chains.append(chain)
+                objections[id(goal)] = (reason.code, reason.message)
+        reasons, chain = self._chains(told)
+        objections |= {
+            id(goal): (reason.code, reason.message)
+            for goal, reason in zip(told, reasons, strict=True)
+            if reason is not None
+        }
+        kept = [goal for goal, reason in zip(told, reasons, strict=True) if reason is None]
         if not kept:
             return Seated([], _NOWHERE, objections)
-        seats = self._seats(kept, chains)
+        seats = self._seats(kept, chain)
         good = np.ones(len(kept), dtype=np.bool_)
         for term in terms:
             unknown = _unknown(seats.observations, term, self.columns, kept)
@@ -111,19 +115,29 @@ class Seating:
             return Seated([], _NOWHERE, objections)
         return Seated([kept[row] for row in rows], seats.rows(rows), objections)
 
-    def _chain(self, goal: Goal) -> Chain | Reason | None:
-        """Chain of a goal whose joints are known; None where joints do not matter and the cell is not known."""
-        if goal.move.external_tcp:
-            return Reason("EXTERNAL_TCP", "the robot holds the part: effects are not written into its points")
-        if goal.move.tool_offset is None:
-            return Reason("RUN_TIME_POSE", "its shift along the tool is computed at run time")
-        if isinstance(self.cell, Reason):
-            return None
-        chain = chain_of(self.cell, goal.move, goal.target, goal.pose)
+    def _chains(self, goals: Sequence[Goal]) -> tuple[list[Reason | None], Chain | None]:
+        """Why the joints of n goals are not known, where they matter; and the chain of those that are seated.
+
+        There is no chain where joints do not matter and one of the goals has none.
+        """
+        none: list[Reason | None] = [None] * len(goals)
+        if isinstance(self.cell, Reason) or not goals:
+            return none, None
+        reasons, chains = chains_of(
+            self.cell, [goal.move for goal in goals], [goal.target for goal in goals], [poses_of(goals)]
+        )
+        chain = chains[0] if chains else None
         if not self.with_arm:
-            return None if isinstance(chain, Reason) and not self.with_rail else chain
-        if isinstance(chain, Reason):
-            return chain
+            complete = all(reason is None for reason in reasons)
+            return (reasons if self.with_rail else none), chain if complete or self.with_rail else None
+        rows = [row for row, reason in enumerate(reasons) if reason is None]
+        for row in rows:
+            reasons[row] = self._not_seated(goals[row])
+        seated = [at for at, row in enumerate(rows) if reasons[row] is None]
+        return reasons, chain.rows(seated) if chain is not None and seated else None
+
+    def _not_seated(self, goal: Goal) -> Reason | None:
+        """Why the joints of a goal are not known, or not to be trusted."""
         status = goal.target.number("S") if self.language.name == "krl" else None
         if status is not None and int(status) & 16:
             message = "its status says that the controller compensates the arm itself (bit 4)"
@@ -131,19 +145,17 @@ class Seating:
         if id(goal.move) not in self._runs.joints:
             why = self._runs.unknown.get(id(goal.move), "no status and turn, or confdata, that fits its pose")
             return Reason("EFFECT_NOT_KNOWN", f"effects of the arm need its joints, which are not known: {why}")
-        return chain
+        return None
 
-    def _seats(self, goals: Sequence[Goal], chains: Sequence[Chain | None]) -> Seats:
-        worlds = stacked(goal.base2spots * goal.pose for goal in goals)
-        known = [chain for chain in chains if chain is not None]
-        chained = stacked_chains(known) if known and len(known) == len(goals) else None
+    def _seats(self, goals: Sequence[Goal], chained: Chain | None) -> Seats:
+        worlds = orthogonal(batch([goal.base2spots for goal in goals]) * poses_of(goals))
         base, gravity, external = IDENTITY, DOWN.copy(), None
         if isinstance(self.cell, RobotCell) and chained is not None:
             placed = standing(self.cell, chained)
             first = placed.robroot if placed.robroot.single else placed.robroot[0]
             base = placed.robroot
             gravity = np.asarray(first.rotation.apply(np.atleast_2d(gravity_in_base(placed))[0]))
-            external = np.array([external_axes(self.cell, goal.target) for goal in goals])
+            external = chained.external
         arm = self.with_arm and isinstance(self.cell, RobotCell) and chained is not None
         joints = np.array([self._runs.joints[id(goal.move)] for goal in goals]) if arm else None
         seen = Observations(
@@ -173,6 +185,15 @@ class Seating:
             name = f"approach_a{axis + 1}"
             found[name] = Covariate(name, "approach", sides[:, axis], None)
         return found
+
+
+def _not_told(goal: Goal) -> Reason | None:
+    """Why no effect can be written into a goal, whatever it is."""
+    if goal.move.external_tcp:
+        return Reason("EXTERNAL_TCP", "the robot holds the part: effects are not written into its points")
+    if goal.move.tool_offset is None:
+        return Reason("RUN_TIME_POSE", "its shift along the tool is computed at run time")
+    return None
 
 
 def _frame_columns(seen: Observations) -> dict[str, Covariate]:

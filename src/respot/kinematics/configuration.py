@@ -146,12 +146,10 @@ def reconfigure(
     reached = rows[np.isfinite(joints[rows]).all(axis=1)]
     if len(reached):
         result[reached] = configuration_of(cell, joints[reached], old[reached])
-    for row in rows:
-        found[row] = (
-            _unreached(cell, model, new_tool2world, new_tool, int(row))
-            if not np.isfinite(joints[row]).all()
-            else _objection(cell, model, joints[row], old_joints[row], old[row])
-        )
+    for row in np.setdiff1d(rows, reached).tolist():
+        found[row] = _unreached(cell, model, new_tool2world, new_tool, row)
+    for row in reached[_doubtful(cell, model, joints[reached], old[reached])].tolist():
+        found[row] = _objection(cell, model, joints[row], old_joints[row], old[row])
     refused = np.array([reason is not None for reason in found])
     result[refused] = old[refused]
     return Reconfiguration(result, joints, old_joints, tuple(found))
@@ -222,18 +220,19 @@ def _taught(
     cost = np.where(usable, np.abs(angles).sum(axis=-1) + 1e6 * ~exactly, np.inf)
     best = np.argmin(cost, axis=1)
     joints = angles[np.arange(len(old)), best]
-    reasons: list[Reason | None] = []
-    undefined = scheme.undefined(old)
-    for row in range(len(old)):
-        reason = None
-        if undefined[row] or not usable[row].any():
+    fitting = usable.any(axis=1) & ~scheme.undefined(old)
+    doubtful = ~fitting | _near_singular(model, np.where(fitting[:, None], joints, 0.0))
+    if model.coupled_23:
+        doubtful |= usable.sum(axis=1) > 1
+    reasons: list[Reason | None] = [None] * len(old)
+    for row in np.flatnonzero(doubtful).tolist():
+        if not fitting[row]:
             untold = (_undetermined(model, solution, "taught") for solution in branches[row, fits[row]])
-            reason = next(filter(None, untold), None) or _misfit(cell, scheme, old[row], branches[row])
+            reasons[row] = next(filter(None, untold), None) or _misfit(cell, scheme, old[row], branches[row])
         elif model.coupled_23 and _differ(angles[row, usable[row]]):
-            reason = _inconsistent(cell, f"{scheme.text(old[row])} fits several solutions of the taught pose")
+            reasons[row] = _inconsistent(cell, f"{scheme.text(old[row])} fits several solutions of the taught pose")
         else:
-            reason = _undetermined(model, joints[row], "taught")
-        reasons.append(reason)
+            reasons[row] = _undetermined(model, joints[row], "taught")
     joints[[reason is not None for reason in reasons]] = np.nan
     return joints, tuple(reasons)
 
@@ -256,6 +255,12 @@ def _misfit(cell: RobotCell, scheme: Scheme, old: Integers, branches: Array) -> 
 
 def _inconsistent(cell: RobotCell, message: str) -> Reason:
     return Reason("CONFIG_INCONSISTENT", f"{message} ({cell.model.name or 'robot'})")
+
+
+def _near_singular(model: OpwRobot, joints: Array) -> Bools:
+    """Which of n rows of joints `_undetermined` has something to say of."""
+    overhead, _, straight = singularity_distances(model, joints).T
+    return np.asarray((overhead <= TAUGHT) | (straight <= TAUGHT))
 
 
 def _undetermined(model: OpwRobot, joints: Array, what: str) -> Reason | None:
@@ -309,6 +314,12 @@ def _unreached(
         return Reason("OUT_OF_REACH", "the moved pose is not a number")
     flange = replace(cell, robroot=root).flange2base(world, tool)
     return Reason("OUT_OF_REACH", f"out of reach: {model.reach_text(flange)}")
+
+
+def _doubtful(cell: RobotCell, model: OpwRobot, joints: Array, old: Integers) -> Bools:
+    """Which of n moved targets `_objection` may have something against."""
+    doubtful = _near_singular(model, joints) | _accurate(cell, old)
+    return np.asarray(doubtful | (outside(joints, cell.limits) > 0.0).any(axis=1))
 
 
 def _objection(cell: RobotCell, model: OpwRobot, joints: Array, old_joints: Array, old: Integers) -> Reason | None:

@@ -44,7 +44,7 @@ class Language:
         ``read_robots(name, root, files, forms)`` reads the files of one controller: its robots, one for each task that
         moves one.
     pose_values : callable
-        Fields of a target for a new pose in its base.
+        ``pose_values(targets, poses)``: fields of n targets for new poses in their bases, a batch of n.
     decimals : callable
         ``decimals(target)``: how many decimals each field of a target gets at least when it changes.
     frame_decimals : mapping of str to int
@@ -67,7 +67,7 @@ class Language:
     block_issues: Callable[[str, Sequence[Statement]], list[Issue]]
     forms: Forms
     read_robots: Callable[[str, str, Mapping[str, bytes], Forms], list[Robot]]
-    pose_values: Callable[[Target, RigidTransform], dict[str, float]]
+    pose_values: Callable[[Sequence[Target], RigidTransform], list[dict[str, float]]]
     decimals: Callable[[Target], dict[str, int]]
     frame_decimals: Mapping[str, int]
     has_configuration: Callable[[Target], bool]

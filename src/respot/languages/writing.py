@@ -234,7 +234,8 @@ def changes_of(
     changes = []
     for name, value in values.items():
         number = numbers[name]
-        style = NumberStyle.of(text[slice(*number.span)]).at_least(decimals[name])
-        if spell(value, style) != spell(number.value, style):
+        style = NumberStyle.changed(text[slice(*number.span)], decimals[name])
+        apart = abs(value - float(number.value)) > 10.0**-style.decimals
+        if apart or spell(value, style) != spell(number.value, style):
             changes.append(Change(number, value, style))
     return changes

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
@@ -19,10 +19,19 @@ def target_poses(targets: Sequence[Target]) -> RigidTransform:
     return pose(components[:, :3], turned(components[:, 3:]))
 
 
-def goal_poses(moves: Sequence[Move], targets: RigidTransform) -> RigidTransform:
+def goal_poses(
+    moves: Sequence[Move], targets: RigidTransform, offset: Callable[[Move], Array] | None = None
+) -> RigidTransform:
     """``goal2base`` of n > 0 motions to targets at ``target2base``: with their shifts along tool and base.
 
-    The shift along the tool must be known, and that along the base literal.
+    Parameters
+    ----------
+    moves : sequence of n Move
+        The shift along the tool must be known, and that along the base literal.
+    targets : RigidTransform
+        A batch of n.
+    offset : callable, optional
+        Components (3,) of the offset of a motion in place of what the program says [mm].
     """
     goals = targets
     tipped = [row for row, move in enumerate(moves) if move.tool_offset is not IDENTITY]
@@ -31,8 +40,9 @@ def goal_poses(moves: Sequence[Move], targets: RigidTransform) -> RigidTransform
         goals = replaced(goals, tipped, goals[tipped] * batch(shifts))
     shifted = [row for row, move in enumerate(moves) if move.offset is not None]
     if shifted:
-        along = RigidTransform.from_translation(ways([moves[row] for row in shifted]))
-        goals = replaced(goals, shifted, along * goals[shifted])
+        moved = [moves[row] for row in shifted]
+        along = ways(moved) if offset is None else np.array([offset(move) for move in moved])
+        goals = replaced(goals, shifted, RigidTransform.from_translation(along) * goals[shifted])
     return goals
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import cos, radians
 
+import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from respot.geometry import abc_from_rotation
@@ -28,10 +30,14 @@ def decimals(target: Target) -> dict[str, int]:
     return found
 
 
-def pose_values(target: Target, pose: RigidTransform) -> dict[str, float]:
-    """New values of a target's fields, for ``pose`` in its base: X, Y, Z in mm, A, B, C in degrees near the old."""
-    values = [*pose.translation, *abc_from_rotation(pose.rotation, near=target.components[3:] or None)]
-    return {name: float(value) for name, value in zip("XYZABC", values, strict=True) if name in target.numbers}
+def pose_values(targets: Sequence[Target], poses: RigidTransform) -> list[dict[str, float]]:
+    """New values of the fields of n targets that have a pose, for poses in their bases.
+
+    X, Y, Z in mm, A, B, C in degrees near the old.
+    """
+    old = np.array([target.components[3:] for target in targets])
+    rows = np.hstack([poses.translation, abc_from_rotation(poses.rotation, near=old)]).tolist()
+    return [dict(zip("XYZABC", row, strict=True)) for row in rows]
 
 
 def has_configuration(target: Target) -> bool:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from respot.geometry import quaternion_from_rotation
@@ -34,11 +37,14 @@ def decimals(target: Target) -> dict[str, int]:
     return found
 
 
-def pose_values(target: Target, pose: RigidTransform) -> dict[str, float]:
-    """New values of a target's fields, for ``pose`` in its work object: x, y, z in mm, q1 to q4 near the old ones."""
-    old = [target.number(name) or 0.0 for name in _QUATERNION]
-    values = [*pose.translation, *quaternion_from_rotation(pose.rotation, near=old)]
-    return {name: float(value) for name, value in zip(_POSITION + _QUATERNION, values, strict=True)}
+def pose_values(targets: Sequence[Target], poses: RigidTransform) -> list[dict[str, float]]:
+    """New values of the fields of n targets that have a pose, for poses in their work objects.
+
+    x, y, z in mm, q1 to q4 near the old ones.
+    """
+    old = np.array([target.components[3:] for target in targets])
+    rows = np.hstack([poses.translation, quaternion_from_rotation(poses.rotation, near=old)]).tolist()
+    return [dict(zip(_POSITION + _QUATERNION, row, strict=True)) for row in rows]
 
 
 def has_configuration(target: Target) -> bool:
