@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform
 
-from respot.kinematics.cell import Reason, RobotCell
-from respot.kinematics.motion_chain import Chain, chain_of
+from respot.kinematics.cell import RobotCell
+from respot.kinematics.motion_chain import chains_of
 from respot.kinematics.robots import find_robot
 from respot.kinematics.track import Track
 from respot.program.frames import Frame
@@ -175,10 +175,10 @@ def test_the_chain_of_an_external_tcp(language):
     tool, base = (part, gun) if language == "krl" else (gun, part)
     move = Move(Motion.LINEAR, "LIN", None, "p", "p", "p", 1, tool=tool, base=base, external_tcp=True)
     cell = RobotCell(find_robot("kr210_r2700_prime"), language)
-    chain = chain_of(cell, move, Target("t", TargetKind.POSE, "p", 1, 1, (0, 0)), rigid(SEEN))
-    assert isinstance(chain, Chain)
+    targets, seen = [Target("t", TargetKind.POSE, "p", 1, 1, (0, 0))], rigid([SEEN])
+    _, (chain,) = chains_of(cell, [move], targets, [seen])
     flange = cell.flange2base(chain.tool2world, chain.tool2flange)
-    assert flange.as_matrix() @ np.array(PART) @ np.array(SEEN) == pytest.approx(np.array(GUN))
+    assert flange.as_matrix()[0] @ np.array(PART) @ np.array(SEEN) == pytest.approx(np.array(GUN))
 
 
 def test_what_is_not_known_of_a_chain_is_said():
@@ -187,8 +187,8 @@ def test_what_is_not_known_of_a_chain_is_said():
 
     def code(tool, base):
         move = Move(Motion.LINEAR, "LIN", None, "p", "p", "p", 1, tool=tool, base=base)
-        found = chain_of(cell, move, target, rigid(SEEN))
-        assert isinstance(found, Reason)
+        (found,), chains = chains_of(cell, [move], [target], [rigid([SEEN])])
+        assert chains == []
         return found.code
 
     assert code(None, known) == "UNKNOWN_TOOL"

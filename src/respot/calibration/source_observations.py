@@ -19,9 +19,10 @@ from respot.kinematics.configuration import taught_joints
 from respot.kinematics.from_backup import cell_of
 from respot.kinematics.gravity import gravity_in_base
 from respot.kinematics.model import RobotModel
-from respot.kinematics.motion_chain import Chain, chain_of, stacked, standing
+from respot.kinematics.motion_chain import Chain, chains_of, standing
 from respot.languages import LANGUAGES
 from respot.program.moves import Move
+from respot.program.poses import target_poses
 from respot.program.robot import Robot
 from respot.program.targets import Target, TargetKind
 from respot.spots import Source
@@ -268,21 +269,26 @@ def _joints_of(cell: RobotCell, robot: Robot, moves: Sequence[Move]) -> tuple[Ar
     """Joints (n, 6) that the targets' own configurations define, NaN where none does, and their chains."""
     fields = LANGUAGES[robot.language].configuration_fields
     joints = np.full((len(moves), 6), np.nan)
-    rows, chains, numbers = [], [], []
+    rows: list[int] = []
+    targets: list[Target] = []
+    numbers: list[list[float]] = []
     for row, move in enumerate(moves):
         target = move.target
-        if target is None or target.pose is None or move.tool_offset is None:
+        if target is None or not target.components or move.offset is not None or move.tool_offset is not IDENTITY:
             continue
-        own = [target.number(name) for name in fields]
-        goal = target.pose if move.offset is None and move.tool_offset is IDENTITY else None
-        chain = None if goal is None else chain_of(cell, move, target, goal)
-        if isinstance(chain, Chain) and all(number is not None for number in own):
+        own = [number for name in fields if (number := target.number(name)) is not None]
+        if len(own) == len(fields):
             rows.append(row)
-            chains.append(chain)
-            numbers.append([float(number) for number in own if number is not None])
+            targets.append(target)
+            numbers.append(own)
     if not rows:
         return joints, None
-    chain = stacked(chains)
+    reasons, chains = chains_of(cell, [moves[row] for row in rows], targets, [target_poses(targets)])
+    if not chains:
+        return joints, None
+    chain = chains[0]
+    numbers = [own for own, reason in zip(numbers, reasons, strict=True) if reason is None]
+    rows = [row for row, reason in zip(rows, reasons, strict=True) if reason is None]
     joints[rows], _ = taught_joints(standing(cell, chain), chain.tool2flange, chain.tool2world, np.array(numbers))
     return joints, chain if len(rows) == len(moves) else None
 

@@ -8,6 +8,7 @@ from fnmatch import fnmatchcase
 from itertools import pairwise
 
 import numpy as np
+from scipy.spatial import KDTree
 from scipy.spatial.transform import RigidTransform
 
 from respot import __version__
@@ -29,14 +30,14 @@ from respot.correction.pose_table import PoseTable
 from respot.correction.preflight import Checked, Preflight
 from respot.correction.scope import Moving, Refusal, Scope, Stay, find_scope
 from respot.correction.sequence import sequences
-from respot.geometry import Array, distance_mm, turn_deg
+from respot.geometry import Array, batch, distance_mm, turn_deg
 from respot.issues import BadInputError, Issue
 from respot.kinematics.cell import Reason, RobotCell
 from respot.kinematics.from_backup import cell_of
 from respot.languages import LANGUAGES, Language
 from respot.languages.writing import Header, applied_calibrations, templates
 from respot.program.moves import Move
-from respot.program.poses import target_poses
+from respot.program.poses import spot_poses, target_poses
 from respot.program.robot import Robot
 from respot.source import Edit, splice
 
@@ -447,16 +448,17 @@ def _issues(
 
 def _extrapolated(moving: Sequence[Moving], spot_moves: Sequence[Move]) -> list[Issue]:
     """One issue for all moved targets outside the hull of the fitted spots."""
-    spots = np.array([pose.translation for move in spot_moves if (pose := move.spot_pose) is not None]).reshape(-1, 3)
-    # the target itself: where a motion shifts it to may be known only while the robot runs
-    places = [item.base2spots * item.target.pose for item in moving if item.target.pose is not None]
-    points = np.array([place.translation for place in places]).reshape(-1, 3)
-    if not len(points) or not len(spots):
+    fitted = [move for move in spot_moves if move.has_spot_pose]
+    if not moving or not fitted:
         return []
+    spots = np.asarray(spot_poses(fitted).translation)
+    # the target itself: where a motion shifts it to may be known only while the robot runs
+    places = batch([item.base2spots for item in moving]) * target_poses([item.target for item in moving])
+    points = np.asarray(places.translation)
     beyond = outside(spots, points)
     if not beyond.any():
         return []
-    nearest = np.linalg.norm(points[beyond][:, None, :] - spots[None, :, :], axis=2).min(axis=1)
+    nearest = np.asarray(KDTree(spots).query(points[beyond])[0])
     names = [item.target.name for item, out in zip(moving, beyond, strict=True) if out]
     farthest = names[int(nearest.argmax())]
     message = (

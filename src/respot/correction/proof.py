@@ -80,9 +80,12 @@ def prove(correction: Correction, old: Mapping[str, bytes], new: Mapping[str, by
     if correction.depth.changes:
         _check_flanges(correction, robot)
     literals_before, literals_after = _literals(correction.robot), _literals(robot)
+    by_path: dict[str, dict[Span, PointEdit]] = {}
+    for edit in correction.edits:
+        by_path.setdefault(edit.path, {})[edit.edit.span] = edit
     for path in correction.files:
         before, after = literals_before.get(path, []), literals_after.get(path, [])
-        edits = {edit.edit.span: edit for edit in correction.edits if edit.path == path}
+        edits = by_path.get(path, {})
         _compare(path, correction.language, correction.robot.files[path], robot.files[path], before, after, edits)
 
 

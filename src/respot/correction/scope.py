@@ -134,6 +134,8 @@ class _Finder:
             if move.target is not None:
                 self._everywhere.setdefault(id(move.target), []).append(move)
         self._found: dict[tuple[str, int, bool], bool] = {}
+        self._mixed: dict[tuple[str, int, int, bool], bool] = {}
+        self._worlds: dict[int, bool] = {}
         self._positions = positions_of(robot)
         self._frame_names = _frame_names(self._everywhere.values())
 
@@ -183,7 +185,7 @@ class _Finder:
             return False
         if not self._is_matched(move, routine.task):
             return False
-        return move.external_tcp or not (_is_world(move.base) and self._is_service(routine))
+        return move.external_tcp or not (self._in_world(move) and self._is_service(routine))
 
     def _is_matched(self, move: Move, task: str) -> bool:
         """Whether a matched spot of the task uses the base, or is on the held part, under this or another name."""
@@ -197,11 +199,21 @@ class _Finder:
 
     def _is_mixed(self, move: Move, task: str) -> bool:
         """Whether a motion takes the frames of a matched spot the other way round (facts: krl.md 5, mixed modes)."""
-        spots = (part.move for part in self._parts if part.task == task)
-        return any(
-            spot.external_tcp != move.external_tcp and (_shared(spot.base, move.base) or _shared(spot.tool, move.tool))
-            for spot in spots
-        )
+        key = (task, id(move.base), id(move.tool), move.external_tcp)
+        if key not in self._mixed:
+            self._mixed[key] = any(
+                spot.external_tcp != move.external_tcp
+                and (_shared(spot.base, move.base) or _shared(spot.tool, move.tool))
+                for spot in (part.move for part in self._parts if part.task == task)
+            )
+        return self._mixed[key]
+
+    def _in_world(self, move: Move) -> bool:
+        """Whether the base of a motion is the world."""
+        key = id(move.base)
+        if key not in self._worlds:
+            self._worlds[key] = _is_world(move.base)
+        return self._worlds[key]
 
     def _refusal(self, move: Move, routine: Routine) -> Refusal | None:
         name = str(move.target) if move.target is not None else f"{move.instruction}@{move.line}"
@@ -224,7 +236,7 @@ class _Finder:
             assert move.base is not None  # noqa: S101 - the base is what carries the part
             return refuse("UNKNOWN_FRAME", f"base {move.base}: {move.base.unknown}")
         elsewhere = id(routine) not in self._core or self._is_service(routine)
-        in_world = not move.external_tcp and _is_world(move.base)
+        in_world = not move.external_tcp and self._in_world(move)
         if in_world and not self._is_matched(move, routine.task) and not elsewhere:
             message = (
                 f"{move.routine} welds under other bases but goes to this target in the world frame: "
@@ -249,7 +261,7 @@ class _Finder:
             return refuse("EXTERNAL_TCP", _WAY_OF_PART)
         if move.unknown:
             return refuse(_code_of(move), move.unknown)
-        if move.target is not None and move.target.pose is None:
+        if move.target is not None and not move.target.components:
             return refuse("RUN_TIME_POSE", move.target.unknown)
         if move.offset is not None and not move.offset.literal:
             return refuse(
@@ -317,7 +329,7 @@ def _take_originals(scope: Scope) -> None:
     moving = {key: item for key, item in moving.items() if named[key] == 1}  # another is declared in a routine
     for stay in [stay for stay in scope.stays if stay.target.original_of]:
         twin = moving.get((stay.target.path, stay.target.original_of.lower()))
-        if twin is not None and stay.code == "NOT_REACHED" and stay.target.pose is not None:
+        if twin is not None and stay.code == "NOT_REACHED" and stay.target.components:
             scope.stays.remove(stay)
             scope.moving.append(Moving(stay.target, twin.base2spots, twin.moves))
 

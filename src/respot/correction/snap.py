@@ -25,7 +25,7 @@ from respot.correction.goals import Goal, goals_of
 from respot.correction.image import Direction, RigidImage
 from respot.correction.scope import Moving, Refusal, Scope
 from respot.correction.sequence import sequences
-from respot.geometry import IDENTITY, Array
+from respot.geometry import IDENTITY, Array, batch
 from respot.issues import BadInputError, Issue
 from respot.program.frames import Frame
 from respot.program.moves import Move
@@ -82,11 +82,11 @@ class SnappedImage:
     def tool_change(self, tool: Frame) -> None:
         """No tool is wrong."""
 
-    def pose(self, moving: Moving) -> RigidTransform:
-        """New ``target2base``."""
-        shift = RigidTransform.from_translation(self._shifts.get(id(moving), np.zeros(3)))
-        base = moving.base2spots
-        return base.inv() * shift * base * self.rigid.pose(moving)
+    def poses(self, moving: Sequence[Moving]) -> RigidTransform:
+        """New ``target2base`` of n > 0 targets."""
+        shifts = RigidTransform.from_translation(np.array([self._shifts.get(id(item), np.zeros(3)) for item in moving]))
+        bases = batch([item.base2spots for item in moving])
+        return bases.inv() * shifts * bases * self.rigid.poses(moving)
 
     def offset(self, move: Move) -> Array:
         """New components (3,) of an offset along the base [mm]."""

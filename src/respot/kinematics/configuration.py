@@ -30,6 +30,8 @@ KEEP = ROUNDING
 TAUGHT = 0.02
 #: The nominal joints of an absolutely accurate robot are not its joints; within this of a border they decide nothing.
 ACCURATE = 0.5
+#: Taught points that are looked at together: the trials of full turns take 5 kB each, several times.
+_AT_ONCE = 4096
 #: No status, turn or quadrant is as large.
 NO_NUMBER = 1_000_000
 
@@ -105,7 +107,10 @@ def taught_joints(
     old = _whole(configuration)
     if refused is not None or not isinstance(cell.model, OpwRobot):
         return np.full((len(old), 6), np.nan), (refused,) * len(old)
-    return _taught(cell, cell.model, all_solutions(cell, cell.model, tool2world, tool2flange, len(old)), old)
+    branches = all_solutions(cell, cell.model, tool2world, tool2flange, len(old))
+    pieces = [slice(start, start + _AT_ONCE) for start in range(0, max(len(old), 1), _AT_ONCE)]
+    taught = [_taught(cell, cell.model, branches[piece], old[piece]) for piece in pieces]
+    return np.concatenate([joints for joints, _ in taught]), tuple(reason for _, some in taught for reason in some)
 
 
 def reconfigure(

@@ -41,32 +41,13 @@ class Chain:
         return Chain(self.tool2world[rows], self.tool2flange[rows], self.external[rows])
 
 
-def chain_of(cell: RobotCell, move: Move, target: Target, target2base: RigidTransform) -> Chain | Reason:
-    """Chain of a motion to ``target`` lying at ``target2base``, or what is not known of it.
-
-    KUKA's #TCP: $BASE is the gun in the world, $TOOL the part on the flange (facts: krl.md 5). ABB: the gun is the
-    tool, the part the work object (rapid.md 2.4).
-    """
-    for frame, code in ((move.tool, "UNKNOWN_TOOL"), (move.base, "UNKNOWN_FRAME")):
-        if frame is None or frame.pose is None:
-            what = "the tool" if code == "UNKNOWN_TOOL" else "the base"
-            return Reason(code, f"{what}: {'the program does not tell it' if frame is None else frame.unknown}")
-    assert move.tool is not None and move.base is not None  # noqa: S101 - just seen
-    tool, base = move.tool.pose, move.base.pose
-    assert tool is not None and base is not None  # noqa: S101
-    external = external_axes(cell, target)
-    if cell.on_track and (cell.track is None or not np.isfinite(external[cell.track.axis])):
-        return _NO_TRACK
-    if not move.external_tcp:
-        return Chain(base * target2base, tool, external)
-    gun, part = (tool, base) if move.base.held else (base, tool)
-    return Chain(gun, part * target2base, external)
-
-
 def chains_of(
     cell: RobotCell, moves: Sequence[Move], targets: Sequence[Target], poses: Sequence[RigidTransform]
 ) -> tuple[list[Reason | None], list[Chain]]:
-    """Chains of n motions to targets, as `chain_of` says it of each.
+    """Chains of n motions to targets, and what is not known of them.
+
+    KUKA's #TCP: $BASE is the gun in the world, $TOOL the part on the flange (facts: krl.md 5). ABB: the gun is the
+    tool, the part the work object (rapid.md 2.4).
 
     Parameters
     ----------
@@ -81,7 +62,7 @@ def chains_of(
         What is not known of each motion; and for each of ``poses`` the chain of the m motions of which all is known,
         empty where m is 0.
     """
-    external = all_external_axes(cell, targets)
+    external = external_axes(cell, targets)
     on_rail = np.ones(len(moves), dtype=bool)
     if cell.on_track:
         on_rail = np.isfinite(external[:, cell.track.axis]) if cell.track is not None else ~on_rail
@@ -126,27 +107,12 @@ def _carrying(move: Move) -> tuple[RigidTransform, RigidTransform]:
     return (base, tool) if move.base.held else (tool, base)
 
 
-def all_external_axes(cell: RobotCell, targets: Sequence[Target]) -> Array:
-    """External axes of n targets, shape (n, 6); as `external_axes` says it of each."""
+def external_axes(cell: RobotCell, targets: Sequence[Target]) -> Array:
+    """External axes of n targets, shape (n, 6), NaN where a target does not give them."""
     names = EXTERNAL[cell.language]
     rows = [[target.number(name) for name in names] for target in targets]
     numbers = np.array(rows, dtype=float).reshape(-1, len(names))  # None becomes NaN
     return np.where(np.abs(numbers) > _UNUSED, np.nan, numbers)
-
-
-def external_axes(cell: RobotCell, target: Target) -> Array:
-    """External axes of a target, shape (6,), NaN where it does not give them."""
-    numbers = [target.number(name) for name in EXTERNAL[cell.language]]
-    return np.array([np.nan if number is None or abs(number) > _UNUSED else number for number in numbers])
-
-
-def stacked(chains: Sequence[Chain]) -> Chain:
-    """Return one chain of n motions, n > 0."""
-    world, tool = (
-        RigidTransform.from_matrix(np.stack([getattr(chain, name).as_matrix() for chain in chains]))
-        for name in ("tool2world", "tool2flange")
-    )
-    return Chain(world, tool, np.stack([chain.external for chain in chains]))
 
 
 def standing(cell: RobotCell, chain: Chain) -> RobotCell:

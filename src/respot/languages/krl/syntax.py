@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from itertools import count
 
 from respot.languages.shapes import LONGEST_STATEMENT, Cache, Shapes
@@ -101,7 +102,17 @@ _COMMON = frozenset(
 )
 _DEF = re.compile(r"(?:GLOBAL\s+)?DEF(?:FCT|DAT)?\b", re.IGNORECASE)
 _SNIFFED_STATEMENTS = 300
+_SNIFFED_LINES = 32
 _SNIFFED_TEXT = 100_000
+
+
+def _sniffed(text: str) -> Iterator[Statement]:
+    """Statements of the beginning of a file, read only as far as they are asked for."""
+    starts = [0, *(match.end() for match in NEWLINE.finditer(text)), len(text)]
+    for first in range(0, len(starts) - 1, _SNIFFED_LINES):
+        some = starts[first : first + _SNIFFED_LINES + 1]
+        piece = text[some[0] : some[-1]]
+        yield from read_statements(piece, [start - some[0] for start in some[:-1]])
 
 
 def looks_like_krl(text: str) -> bool:
@@ -114,8 +125,7 @@ def looks_like_krl(text: str) -> bool:
     beginning = text[:_SNIFFED_TEXT]
     known = ended = total = 0
     telling, share = False, 0.9
-    starts = [0, *(match.end() for match in NEWLINE.finditer(beginning))]
-    for statement in read_statements(beginning, starts):
+    for statement in _sniffed(beginning):
         telling |= statement.kind not in _COMMON
         if statement.kind in NO_STATEMENT or statement.kind == "header":
             continue
