@@ -73,7 +73,9 @@ class Backup:
             hints = [issue for issue in self.issues if issue.code in ("NESTED_ARCHIVE", "HALF_BACKUP")]
             if hints:
                 more = f" (and {len(hints) - 1} more)" if len(hints) > 1 else ""
-                message = f"holds no robot program outside of {hints[0].path}, which {hints[0].message}{more}"
+                hint = hints[0]
+                where = f" outside of {hint.path}, which {hint.message}" if hint.path else f": {hint.message}"
+                message = f"holds no robot program{where}{more}"
             raise BadInputError("NO_ROBOT", message, str(self.path))
         names = ", ".join(robot.name for robot in self.robots)
         if name is None:

@@ -235,6 +235,12 @@ def test_a_backup_without_modules(respot, tmp_path):
     assert "HALF_BACKUP" in {issue.code for issue in open_backup(tmp_path / "empty").issues}
 
 
+def test_a_backup_without_modules_given_by_its_own_folder(tmp_path):
+    write(tmp_path / "SYS1", {"BACKINFO/backinfo.txt": backinfo(), "SYSPAR/MOC.cfg": "MOC:CFG_1.0:6:0::\n"})
+    with pytest.raises(BadInputError, match="holds no robot program: SYSPAR and BACKINFO"):
+        open_backup(tmp_path / "SYS1").robot()
+
+
 def test_modules_that_backinfo_lists_and_the_backup_lacks(tmp_path):
     listed = backinfo("TASK1: (T_ROB1,P,)\nPROGMOD/A.mod @ \nPROGMOD/Gone.mod @ \nSYSMOD/LINKEDM.sys @ HIDDEN")
     files = {"BACKINFO/backinfo.txt": listed, "RAPID/TASK1/PROGMOD/a.MOD": module("A")}
