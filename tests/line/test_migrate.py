@@ -19,9 +19,11 @@ from respot import __version__
 from respot.cli import app
 from respot.issues import BadInputError
 from respot.line import folder as folders
+from respot.line.jobs import job_of
 from respot.line.ledger import Ledger, Lock
 from respot.line.line_file import read_line
 from respot.line.run import Workers, run_line
+from respot.line.work import do_job
 from tests.line.lines import contents, make_line
 
 SAMPLES = Path(__file__).parents[2] / "samples" / "rear_door"
@@ -258,10 +260,10 @@ def test_a_folder_that_no_line_wrote_or_that_is_read(doors, tmp_path):
 def test_a_full_disk_fails_that_robot_and_no_other(doors, tmp_path, monkeypatch):
     real = folders.OutputFolder.put
 
-    def full(self, name):
+    def full(self, name, made):
         if name == "K":
             raise OSError(28, "No space left on device")
-        real(self, name)
+        real(self, name, made)
 
     monkeypatch.setattr(folders.OutputFolder, "put", full)
     record = migrate(doors, "-o", tmp_path / "out", code=1)
@@ -398,3 +400,15 @@ def test_errors_of_one_robot_carry_its_own_words(tmp_path, doors):
 def test_a_ledger_that_is_not_there_cannot_be_looked_at(tmp_path):
     with pytest.raises(BadInputError, match="BAD_LEDGER"):
         Ledger(tmp_path, readonly=True)
+
+
+def test_a_robot_that_is_done_twice_is_done(tmp_path):
+    """Of a worker that was lost nobody knows how far it came: the next one must not find its folder taken."""
+    line = read_line(make_line(tmp_path / "line", 8))
+    job = job_of(line, line.robots[0])
+    staging = tmp_path / "staging" / job.name
+    staging.parent.mkdir()
+    results = [do_job(job, str(staging)) for _ in range(2)]
+    assert [result.state for result in results] == ["done", "done"], results[1].error
+    assert results[0].outputs == results[1].outputs
+    assert sorted(path.name for path in staging.parent.iterdir()) == sorted(result.made for result in results)

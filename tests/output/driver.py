@@ -142,7 +142,9 @@ def _child(request: dict, begun: int, place: Path) -> None:
         said.update(steps=steps.names)
         if request.get("list"):
             said["left"] = sorted(str(path.relative_to(request["list"])) for path in Path(request["list"]).rglob("*"))
-        (place / "said").write_text(json.dumps(said))
+        # whoever is killed here has said all or nothing
+        (place / "saying").write_text(json.dumps(said))
+        (place / "saying").replace(place / "said")
     finally:
         os._exit(code)
 

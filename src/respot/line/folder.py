@@ -31,7 +31,7 @@ class OutputFolder:
         self._own = self.path / WORK / uuid4().hex
 
     def staging(self, name: str) -> Path:
-        """Place where a robot's new folder is made; unlike that of any other run."""
+        """Begin of the path of a robot's new folder while it is made; unlike that of any other run."""
         return self._own / name
 
     def robot(self, name: str) -> Path:
@@ -52,19 +52,20 @@ class OutputFolder:
         except OSError as error:
             raise BadInputError("CANNOT_WRITE", f"cannot be written: {error.strerror}", str(self.path)) from error
 
-    def unpack(self, name: str, files: Mapping[str, bytes]) -> None:
-        """Write a robot's new folder that came as bytes."""
+    def unpack(self, name: str, files: Mapping[str, bytes]) -> str:
+        """Write a robot's new folder that came as bytes; return the name that it has until it is in place."""
         for path, data in files.items():
             place = self.staging(name) / path
             place.parent.mkdir(parents=True, exist_ok=True)
             place.write_bytes(data)
+        return name
 
-    def put(self, name: str) -> None:
-        """Move a robot's new folder into place; the old one goes."""
+    def put(self, name: str, made: str) -> None:
+        """Move a robot's new folder into place, by the name that it was made under; the old one goes."""
         self.remove(name)
         place = self.robot(name)
         place.parent.mkdir(exist_ok=True)
-        self.staging(name).rename(place)
+        self.staging(made).rename(place)
 
     def remove(self, name: str) -> None:
         """Take a robot's folder away."""

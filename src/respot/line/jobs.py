@@ -68,6 +68,8 @@ class JobResult:
         Hash and size of each file of its folder, by path.
     cpu_seconds : float
         What it took.
+    made : str
+        Name of the folder that holds what was written, among those of all attempts.
     files : mapping of str to bytes, optional
         The folder itself, where the worker cannot write it.
     """
@@ -82,6 +84,7 @@ class JobResult:
     edits: Sequence[Mapping[str, Any]] = ()
     outputs: Mapping[str, tuple[str, int]] = field(default_factory=dict)
     cpu_seconds: float = 0.0
+    made: str = ""
     files: Mapping[str, bytes] | None = None
 
 

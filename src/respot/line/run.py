@@ -296,9 +296,8 @@ def _settle(result: JobResult, folder: OutputFolder) -> JobResult:
         if result.state != "done":
             folder.remove(result.name)
             return result
-        if result.files is not None:
-            folder.unpack(result.name, result.files)
-        folder.put(result.name)
+        made = result.made if result.files is None else folder.unpack(result.name, result.files)
+        folder.put(result.name, made)
     except OSError as error:
         return JobResult(result.name, "failed", "CANNOT_WRITE", f"its folder cannot be written: {error.strerror}")
     return result

@@ -10,8 +10,10 @@ import time
 import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import chdir, contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 from respot.calibration.calibration import Calibration
 from respot.calibration.final_model import precise
@@ -41,14 +43,16 @@ def do_job(job: Job, staging: str | None, sent: Mapping[str, bytes] | None = Non
     job : Job
         What to do.
     staging : str or None
-        New folder for what is written; None where nothing is to be written.
+        Begin of the path of a new folder for what is written; None where nothing is to be written. Each attempt has a
+        folder of its own: of a worker that was lost nobody knows how far it came, or whether it still writes.
     sent : mapping of str to bytes, optional
         The inputs, where their paths mean nothing here; what is written is returned instead.
     """
     started = time.process_time()
     with _few_collections():
         if sent is None:
-            result = _guarded(job, None if staging is None else Path(staging))
+            place = None if staging is None else Path(f"{staging}.{uuid4().hex}")
+            result = replace(_guarded(job, place), made="" if place is None else place.name)
         else:
             result = _elsewhere(job, staging is not None, sent)
     return _with_time(result, time.process_time() - started)
