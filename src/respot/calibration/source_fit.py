@@ -316,8 +316,9 @@ def _tool_issues(fit: SpotFit, source: Source) -> list[Issue]:
 def _renamed(fit: SpotFit, source: Source, reference: Source) -> list[Issue]:
     """Spots without a partner that lie where the other list has one without a partner: probably renamed."""
     assert fit.match is not None  # noqa: S101 - only called where two lists were paired
-    own = [row for row, name in enumerate(source.spots.ids) if name in set(fit.match.missing)]
-    other = [row for row, name in enumerate(reference.spots.ids) if name in set(fit.match.extra)]
+    missing, extra = set(fit.match.missing), set(fit.match.extra)
+    own = [row for row, name in enumerate(source.spots.ids) if name in missing]
+    other = [row for row, name in enumerate(reference.spots.ids) if name in extra]
     if not own or not other:
         return []
     model = fit.beside or fit

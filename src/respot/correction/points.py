@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
+from scipy.spatial.transform import RigidTransform, Rotation
 
 from respot.correction.scope import Moving
 from respot.geometry import Array, batch, distance_mm, pose, rotation_from_abc, rotation_from_quaternion, turn_deg
@@ -158,7 +159,13 @@ def point_edits(
 def new_offset(offset: BaseOffset, base: RigidTransform, source2reference: RigidTransform) -> Array:
     """Return the new components (3,) of an offset along the base, mm."""
     old = np.array([0.0 if number is None else float(number.value) for number in offset.numbers])
-    return np.asarray(in_base(base, source2reference).rotation.apply(old))
+    return np.asarray(_turn_in_base(base, source2reference).apply(old))
+
+
+@lru_cache(maxsize=256)
+def _turn_in_base(base: RigidTransform, source2reference: RigidTransform) -> Rotation:
+    """Rotation of a correction seen in a base; thousands of motions share a base."""
+    return in_base(base, source2reference).rotation
 
 
 def offset_edit(move: Move, values: Array, text: str, templates: Templates) -> PointEdit | None:

@@ -152,11 +152,12 @@ def _compare(
         edit = edits.get(old_span)
         if edit is None:
             continue
-        names = [name for name in edit.intended if name in new_numbers]
-        old_cuts += [old_numbers[name].span for name in names if name in old_numbers]
-        new_cuts += _added(new.source, new_span, [new_numbers[name] for name in names if name not in old_numbers])
-        new_cuts += [new_numbers[name].span for name in names if name in old_numbers]
-        _check_values(path, new.source, edit, new_numbers)
+        numbers = {name: new_numbers[name] for name in edit.intended if name in new_numbers}
+        kept = [name for name in numbers if name in old_numbers]
+        old_cuts += [old_numbers[name].span for name in kept]
+        new_cuts += _added(new.source, new_span, [numbers[name] for name in numbers if name not in old_numbers])
+        new_cuts += [numbers[name].span for name in kept]
+        _check_values(path, new.source, edit, numbers)
     if _cut(old.source.text, old_cuts) != _cut(new.source.text, new_cuts):
         line = _first_difference(old.source.text, old_cuts, new.source, new_cuts)
         raise VerifyError(f"{path}: differs outside the numbers of moved targets, first in line {line}", path, line)

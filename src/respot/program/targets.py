@@ -65,6 +65,9 @@ class LiteralNumbers(Mapping[str, Number]):
         start, end = self._places[2 * index : 2 * index + 2]
         return Number(Decimal(self._text[start:end]), (start, end))
 
+    def __contains__(self, name: object) -> bool:
+        return name in self._names
+
     def __iter__(self) -> Iterator[str]:
         return iter(self._names)
 

@@ -7,6 +7,8 @@ moving kinematic if ``MACHINE_FRAME_DAT[n]`` names one.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from scipy.spatial.transform import RigidTransform
 
 from respot.geometry import pose, rotation_from_abc
@@ -30,8 +32,14 @@ def frame_pose(aggregate: Aggregate) -> RigidTransform | None:
 def shift_of(aggregate: Aggregate) -> RigidTransform | None:
     """Shift of a relative motion, in which a component that is left out is zero; None where one is no number."""
     values = [aggregate.number(name) if name in aggregate.members else 0.0 for name in "XYZABC"]
-    known = [value for value in values if value is not None]
-    return pose(known[:3], rotation_from_abc(known[3:])) if len(known) == 6 else None
+    known = tuple(value for value in values if value is not None)
+    return _shift(known) if len(known) == 6 else None
+
+
+@lru_cache(maxsize=4096)
+def _shift(components: tuple[float, ...]) -> RigidTransform:
+    """Pose of X, Y, Z, A, B, C; programs go the same short ways again and again."""
+    return pose(components[:3], rotation_from_abc(components[3:]))
 
 
 class Frames:
