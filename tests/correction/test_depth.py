@@ -402,3 +402,15 @@ def test_aligning_corrects_tool_and_points_or_points_alone(tmp_path):
         assert krl_frame(points, "BASE_DATA[1]") @ krl_pose(points, name) == pytest.approx(motion @ tip, abs=2e-3)
     assert krl_frame(points, "TOOL_DATA[1]") == pytest.approx(krl_frame(backup, "TOOL_DATA[1]"), abs=1e-12)
     assert any("bring its own tool" in issue["message"] for issue in record["issues"])
+
+
+def test_a_tool_that_nobody_knows_is_not_corrected(tmp_path, monkeypatch):
+    """Where the program computes the number of the tool, no frame is there to change: the points say what they say."""
+    files = krl()
+    path = "KRC/R1/Program/weld.src"
+    changed = re.sub(r"(FDAT_ACT=FS\d\n)", r"\1FDAT_ACT.TOOL_NO=which\n", files[path])
+    assert changed != files[path]
+    monkeypatch.setitem(globals(), "krl", lambda: {**files, path: changed})
+    code, record, err, _ = aligned(tmp_path, *FRAMES, "--keep-config")
+    assert code == 0, err
+    assert "tool" not in {edit["depth"] for edit in record["edits"]}

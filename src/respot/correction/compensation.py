@@ -9,7 +9,7 @@ measured calibration) applies the effects: ``P = G^-1 E(P')``, with the G that t
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -31,9 +31,10 @@ from respot.correction.points import moves_at_all, new_offset
 from respot.correction.pose_table import PoseTable
 from respot.correction.scope import Moving, Refusal, Scope
 from respot.correction.seats import Seated, Seating
+from respot.correction.tool_data import said_of_tool, tool_data
 from respot.correction.written import Split
 from respot.geometry import IDENTITY, Array, batch, distance_mm, orthogonal, replaced, turn_deg
-from respot.issues import BadInputError, Issue
+from respot.issues import Issue
 from respot.kinematics.cell import Reason, RobotCell
 from respot.languages import Language
 from respot.program.frames import Frame
@@ -115,7 +116,7 @@ class Compensation:
         # theory: the rigid part is what the simulation lacks; the floor is found by solving
         self._solving = choice.inverse == (calibration.kind == "theory")
         self._kind = calibration.kind
-        self._tools: dict[int, RigidTransform] = {}
+        self._tools: Mapping[int, RigidTransform] = {}
         self._taught: dict[Hashable, RigidTransform] = {}
         self._fixed = IDENTITY if self._gauged else calibration.source2reference.inv()
         self._poses = PoseTable()
@@ -209,36 +210,16 @@ class Compensation:
     def _see_tools(
         self, goals: Sequence[Goal], offsets: Sequence[Goal], scope: Scope, changeable: Changeable | None
     ) -> None:
-        """Decide whether the fitted offset goes into the data of the tool, all of them or none, and say so.
-
-        Raises
-        ------
-        BadInputError
-            ``BAD_OPTION``: it stands in the data of a tool that must stay as it is now.
-        """
-        offset = self._split.errors.tool_offset
+        """Decide where the fitted offset goes, and say so."""
+        offset, choice = self._split.errors.tool_offset, self._choice
         if offset is None:
             return
         fitted = {self._places.of_tool(goal) for goal in goals if goal.spot in self._matched}
         using = [goal for goal in (*goals, *offsets) if self._places.of_tool(goal) in fitted]
-        tools = {id(tool): tool for goal in using if (tool := goal.move.tool) is not None}
-        if changeable is not None:
-            reason = next(filter(None, (changeable.objection(tool, "tool") for tool in tools.values())), "")
-            reason = reason or _with_others(scope, tools)
-            tool = next(iter(tools.values()))
-            if reason and self._choice.in_tool:
-                message = f"the tool offset of this calibration stands in {tool} and cannot be taken out: {reason}"
-                raise BadInputError("BAD_OPTION", message, tool.path, tool.line)
-            if self._choice.in_tool is False:
-                reason = "there it was written before"
-            if reason:
-                message = f"{tool} stays as it is, and its error goes into the points: {reason}"
-                self.issues.append(Issue("FRAME_KEPT", message, tool.path, tool.line))
-            else:
-                change = RigidTransform.from_translation(-offset if self._choice.inverse else offset)
-                self._tools = dict.fromkeys(tools, change)
-        names = ", ".join(dict.fromkeys(str(tool) for tool in tools.values()))
-        self.issues.append(_said_of_tool(offset, names, bool(self._tools), self._solving, self._kind))
+        tools = [*{id(tool): tool for goal in using if (tool := goal.move.tool) is not None}.values()]
+        data = tool_data(offset, tools, scope, changeable, inverse=choice.inverse, in_tool=choice.in_tool)
+        self._tools = data.changes
+        self.issues += [*data.issues, said_of_tool(offset, tools, data, self.direction, self._kind)]
 
     def _states(
         self, errors: Errors, goals: Sequence[Goal], offsets: Sequence[Goal]
@@ -456,36 +437,6 @@ def _targets(goals: Sequence[Goal], found: PoseTable) -> RigidTransform:
     if not goals:
         return batch([IDENTITY])[:0]
     return targets_of(goals, batch([goal.base2spots for goal in goals]).inv() * found.of([id(goal) for goal in goals]))
-
-
-def _with_others(scope: Scope, tools: Collection[int]) -> str:
-    """Say which target is gone to with one of the tools and with another one."""
-    for item in scope.moving:
-        used = {id(move.tool) for move in item.moves}
-        if not used.isdisjoint(tools) and not used <= set(tools):
-            return f"{item.target.name} is used with another tool as well"
-    return ""
-
-
-def _said_of_tool(offset: Array, names: str, in_data: bool, solving: bool, kind: str) -> Issue:
-    """Say where the error of the tool is written, and what a person must not do."""
-    x, y, z = offset.tolist()
-    what = f"tool_offset {x:+.2f} {y:+.2f} {z:+.2f} mm"
-    if in_data:
-        message = f"{what} is written into {names}: points keep what they say of the tip"
-    elif solving:
-        message = (
-            f"{what} is written into the points: leave the TCP in the tool data as it is. Correct the tool or the "
-            "points, never both"
-        )
-    elif kind == "theory":
-        message = (
-            f"{what}: the points are those of a tip that is where its data say, and {names} of this backup is not: the "
-            "simulation must bring its own tool"
-        )
-    else:
-        message = f"{what} is taken out of the points"
-    return Issue("EFFECT_WRITTEN", message)
 
 
 def _of_tool(term: Term) -> bool:
